@@ -96,7 +96,8 @@ def family_tree(
     size = max(7.0, min(10.0, 11.0 * wide / width))
     founders_at = top + _RIM + 0.35 + 1.5 * _SMALL / 72 * width / wide
     end = founders_at + _HEIGHT + 0.1
-    below = max(_BELOW, 0.42 * width / wide)
+    # Below the lowest robot are the key and its name.
+    below = _BELOW if is_roomy else 0.55 * width / wide
     figure = Figure(figsize=(wide, wide / width * (end + below)))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
