@@ -217,13 +217,13 @@ def alike_p(delta: float, first: int, second: int, margin: float) -> float:
 
 
 @lru_cache
-def alike_power(first: int, second: int, margin: float) -> float:
-    """Return how probably ``alike_p`` is at most 5 % for one distribution.
+def alike_power(first: int, second: int, margin: float, alpha: float = ALPHA) -> float:
+    """Return how probably ``alike_p`` is at most ``alpha`` for one distribution.
 
     Counted exactly over all orders of N and M runs, without ties.
     """
     error = math.sqrt(score_variance((margin + 1) / 2, first, second))
-    most = margin - 2 * stats.norm.ppf(1 - ALPHA) * error
+    most = margin - 2 * stats.norm.ppf(1 - alpha) * error
     ways = rank_sum_ways(2 * np.arange(1, first + second + 1), first)
     # A doubled rank sum s is delta = (s - first (first + 1)) / (first second) - 1.
     delta = (np.arange(len(ways)) - first * (first + 1)) / (first * second) - 1
