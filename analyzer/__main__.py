@@ -1,4 +1,4 @@
-"""``revolve analyzer``: vet bodies for a coordinator."""
+"""``revolve analyzer``: breed and vet robots for a coordinator."""
 
 from schema.agent.flags import Flags
 
@@ -9,10 +9,15 @@ def main(arguments: list[str]) -> int:
     Returns:
         0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
     """
+    from functools import partial
+
+    from analyzer.report import analyze
     from analyzer.service import process
+    from coordinator.evolution.newborns import breed
     from schema.agent.command import run_pool
 
-    return run_pool("analyzer", process, arguments[1:], processes=1)
+    body = partial(process, partial(breed, vet=analyze))
+    return run_pool("analyzer", body, arguments[1:], processes=1)
 
 
 def parser(_command: str) -> Flags:

@@ -9,22 +9,18 @@ Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 
 import math
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from analyzer.cylinders import PlacedSolid, least_separation
-from schema.errors import MalformedMessage
-from schema.experiment.document import Vetting, body_space
-from schema.experiment.settings import VettingSettings, read_vetting_settings
+from schema.experiment.document import Vetting
 from schema.parts import IDENTITY, BodySpace, Vector
 from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Report
-from schema.robot.robot import Robot, check_body, check_tree, motor_count
+from schema.robot.robot import Robot, motor_count
 from schema.robot.trace import Floats
-from schema.wire.messages import Request, Vet
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
@@ -36,29 +32,6 @@ At 0.1 m this hides less than 1e-7 m of separation, a tenth of the tolerance.
 ALIGNED = 1e-12
 """Greatest deviation of a box from the axes that counts as axis-aligned."""
 _NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])
-
-
-def answer(request: Request) -> Report:
-    """Return the report on the body of a request; a brain in it is ignored.
-
-    Raises:
-        MalformedMessage: other work.
-        ExperimentError: the settings are invalid or name what does not exist.
-        InvalidRobot: the body space does not allow the body.
-    """
-    if not isinstance(request.work, Vet):
-        raise MalformedMessage("an analyzer vets bodies only")
-    settings, space = _read(request.settings)
-    robot = request.work.robot
-    check_tree(robot.parts)
-    check_body(robot.parts, space)
-    return analyze(robot, space, settings.vetting)
-
-
-@lru_cache(maxsize=64)
-def _read(settings: bytes) -> tuple[VettingSettings, BodySpace]:
-    read = read_vetting_settings(settings)
-    return read, body_space(read.space)
 
 
 def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:

@@ -22,6 +22,7 @@ from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.cli.founders import with_founders
 from coordinator.dispatch.events import AgentKind
+from coordinator.evolution import newborns
 from coordinator.evolution.check_encoding import check_brain_genes
 from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import check_built_in, refuse_faulty, refuse_faulty_of
@@ -236,8 +237,9 @@ def _deployment(
     threads = options.threads or (cores() if is_one_arena else 1)
     most_held = shards_that_fit(memory_bytes(), processes=1)
     shards = Shards(World, most_held=most_held, threads=threads)
+    breed = partial(newborns.breed, vet=analyzer.report.analyze)
     answers: dict[AgentKind, Compute] = {
-        "analyzer": analyzer.report.answer,
+        "analyzer": breed,
         "worker": Jobs(shards).answer,
     }
     agent = agent_of(options, "worker", "own-worker", tls=tls)
@@ -245,7 +247,7 @@ def _deployment(
         replace(agent, threads=threads),
         workers=workers,
         bodies={
-            "analyzer": analyzer.service.process,
+            "analyzer": partial(analyzer.service.process, breed),
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
@@ -257,7 +259,7 @@ def _deployment(
         speed=options.speed,
         arena_workers=options.arena_workers,
         view=options.view,
-        checks=Checks(options.audit, options.on_quarantine == "pause"),
+        checks=Checks(options.audit, options.on_quarantine == "pause", breed),
         allows_drift=options.allow_drift,
         metrics=options.metrics,
         resume_flags=tuple(resume_flags(options)),

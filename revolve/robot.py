@@ -7,7 +7,7 @@ from typing import Self
 import msgspec
 import numpy as np
 
-from coordinator.evolution.breeding import Breeder
+from coordinator.evolution.newborns import founder
 from revolve.arguments import picture_size, whole_number
 from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
@@ -34,7 +34,6 @@ from schema.parts import BodySpace
 from schema.plugins.permission import allowed
 from schema.robot.archive import PACKED, RobotOrigin, read_archive
 from schema.robot.brain import Brain, NeuronKinds
-from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
 from schema.wire.protobuf import encode_robot
@@ -133,10 +132,8 @@ class Robot:
         seed = whole_number("seed", seed, most=MOST_SEED)
         number = whole_number("number", number)
         own = as_experiment(experiment)
-        breeder = Breeder(document_of(own), seed, run=0)
-        candidate = breeder.candidate(BirthId(0, number), 0, ())
-        assert candidate is not None
-        return cls(candidate.robot.parts, candidate.robot.brain, own)
+        robot = founder(document_of(own), seed, number)
+        return cls(robot.parts, robot.brain, own)
 
     def write(self, path: str | Path) -> None:
         """Write the robot to a file.

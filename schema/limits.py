@@ -31,13 +31,13 @@ REQUEST_BYTES = 16 * MIB
 ADVANCE_REQUEST_BYTES = 256 * MIB
 """A request about an arena; it may contain a snapshot and a history."""
 ANSWER_BYTES = 16 * KIB
-"""An answer about one robot, without the intersections of its report."""
+"""An answer about one robot."""
+BRED_BYTES = 4 * MIB
+"""An answer about a birth: reasons of failed attempts, a genome and a robot."""
 TRACE_BYTES = 256 * MIB
 """An answer with the trace of a robot."""
 VALUE_BYTES = 1 * MIB
 """The argument or the value of a call of a user's function."""
-PAIR_BYTES = 16
-"""An intersection in a report."""
 ADVANCE_BYTES = 256 * MIB
 """An answer about an arena, of any arena."""
 INFO_BYTES = 128 * KIB

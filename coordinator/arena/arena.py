@@ -2,9 +2,9 @@
 
 A worker advances the world from one decision to the next. At each decision the arena
 samples, begins a birth, culls, and inserts viable robots. Simulated time stops during
-vetting, and while a learner is asked. The founders are inserted before all that, one by
-one, in reverse order of their generation. Source: Hupkes 2016, section 5.3.3; the code
-of the original.
+breeding, and while a learner is asked. The founders are inserted before all that, one
+by one, in reverse order of their generation. Source: Hupkes 2016, section 5.3.3; the
+code of the original.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from coordinator.arena.arena_migration import ArenaMigration
-from coordinator.arena.candidates import VettingQueue
+from coordinator.arena.candidates import BreedingQueue
 from coordinator.arena.decisions import ArenaDecisions, matings_of
 from coordinator.arena.infancy import Infancy
 from coordinator.arena.living import (
@@ -41,9 +41,6 @@ from coordinator.islands.events import (
     NeighbourClosed,
     Record,
     Started,
-    Verdict,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import ArchiveRows
@@ -51,6 +48,7 @@ from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, steps_of
 from schema.plugins.arena_rules import Conception, Decisions, Place
 from schema.wire.arena import AdvanceShard
+from schema.wire.messages import Bred
 
 
 class Arena:
@@ -94,7 +92,7 @@ class Arena:
         self.encoding = encoding_of(experiment)
         self._number = number
         self._breeder = Breeder(experiment, seed, run, given)
-        self._vetting_queue = VettingQueue(experiment, self._breeder, number)
+        self._breeding_queue = BreedingQueue(experiment, self._breeder, number)
         self._rules = ArenaDecisions(experiment, number, seed=seed, run=run)
         self.living = LivingRobots(
             arena,
@@ -123,8 +121,7 @@ class Arena:
         self._has_started = self._is_held = False
         self._handlers: dict[type, Callable[[Any], list[ArenaCommand]]] = {
             Started: self._started,
-            Vetted: self._vetted,
-            VettingFailed: self._vetted,
+            Bred: self._bred,
             Advanced: self._advanced,
             Commanded: self._commanded,
             Asked: self._asked,
@@ -170,16 +167,16 @@ class Arena:
 
     def _started(self, _event: Started) -> list[ArenaCommand]:
         self._has_started = True
-        return [*self._vetting_queue.begin_founders()]
+        return [*self._breeding_queue.begin_founders()]
 
-    def _vetted(self, event: Verdict) -> list[ArenaCommand]:
-        was_busy = self._vetting_queue.is_busy
-        vets = self._vetting_queue.take(event)
-        if not was_busy or self._vetting_queue.is_busy:
-            return [*vets]
+    def _bred(self, event: Bred) -> list[ArenaCommand]:
+        was_busy = self._breeding_queue.is_busy
+        requests = self._breeding_queue.take(event)
+        if not was_busy or self._breeding_queue.is_busy:
+            return [*requests]
         if self.births:
             return [*self._bear(), *self._conclude()]
-        self._founders = self._vetting_queue.take_viable()
+        self._founders = self._breeding_queue.take_viable()
         return self._decide()
 
     def _asked(self, event: Asked) -> list[ArenaCommand]:
@@ -187,10 +184,10 @@ class Arena:
         birth = event.birth
         if self._infancy is None:
             raise self._unexpected(event, "it has no learners")
-        if birth.island != self._number or not self._vetting_queue.has_taken(birth):
+        if birth.island != self._number or not self._breeding_queue.has_taken(birth):
             raise self._unexpected(event, "no such robot has been born")
         is_new = self._infancy.take(event, self.step)
-        if not is_new or self._infancy.is_waiting or self._vetting_queue.is_busy:
+        if not is_new or self._infancy.is_waiting or self._breeding_queue.is_busy:
             return []
         return self._conclude()
 
@@ -237,7 +234,7 @@ class Arena:
         return commands + self._decide()
 
     def _decide(self) -> list[ArenaCommand]:
-        """Do what is due at this step, up to the next vetting."""
+        """Do what is due at this step, up to the next breeding."""
         commands: list[ArenaCommand] = []
         if self._founders:
             if self.step % self.clock.founder == 0:
@@ -250,7 +247,7 @@ class Arena:
             commands += self._rules.sample(self._moment)
         if self.step % self.clock.birth == 0 or self.step % self.clock.cull == 0:
             commands += self._apply_rules()
-        if self.is_finished or self._vetting_queue.is_busy:
+        if self.is_finished or self._breeding_queue.is_busy:
             return commands
         return [*commands, *self._bear(), *self._conclude()]
 
@@ -282,7 +279,7 @@ class Arena:
             removed = self.living.remove(death.birth)
             commands.append(death_record(removed, death.reason, moment))
         room = min(self.living.room, self.experiment.births - self.births)
-        return [*commands, *self._vetting_queue.begin_children(matings, room)]
+        return [*commands, *self._breeding_queue.begin_children(matings, room)]
 
     def _is_over(self, decisions: Decisions) -> bool:
         """Return whether the run ends here: extinct, all births done, or late."""
@@ -299,7 +296,7 @@ class Arena:
     def _bear(self) -> list[Record | Ask]:
         """Insert the children of the last decision."""
         commands: list[Record | Ask] = []
-        for mating, child, outcome in self._vetting_queue.take_children():
+        for mating, child, outcome in self._breeding_queue.take_children():
             if child is not None:
                 commands += self._insert(child, wish=mating.wish)
             commands += self._rules.end_mating(mating, child, outcome, self._moment)
@@ -313,7 +310,7 @@ class Arena:
             commands += orders.carry_out(self._moment)
         while orders.insertions and not self._founders and self.living.room:
             order = orders.insertions.pop(0)
-            birth = self._vetting_queue.take_number()
+            birth = self._breeding_queue.take_number()
             commands += self._insert(inserted(order, birth, self.encoding), order.place)
         if self._infancy is not None and self._infancy.is_waiting:
             return commands

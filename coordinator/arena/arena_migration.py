@@ -33,7 +33,7 @@ class ArenaMigration:
         self.is_starving = self.is_extinct = False
         self._births = experiment.births
         self._stay = experiment.selection.parents_needed
-        self._develop = encoding_of(experiment).develop
+        self._develop = encoding_of(experiment).robot_of
         self._floor = experiment.arena.population_floor
         self._living = living
         self._queue: list[Individual] = []

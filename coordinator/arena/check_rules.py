@@ -96,7 +96,7 @@ class _PointArena:
         self._born.append(self._number)
         couple = mating.parents[:2] if mating.parents_are_named else ()
         robot = Robot((_POINT,) * (1 + birth.number % _PARTS))
-        child = Candidate(birth, 0, couple, None, robot)
+        child = Candidate(birth, 0, couple, b"", robot, 0)
         place = self._living.random_place(birth, Purpose.PLACE, mating.wish)
         individual = child.individual(generation=None)
         self._living.insert(individual, robot, place, mating.wish.stores)

@@ -142,8 +142,9 @@ def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candida
     genome = encoding.from_bytes(order.genome)
     robot = encoding.develop(genome)
     encoding.check(robot)
+    made = encoding.newborn(genome, robot)
     couple = tuple(
-        Individual(parent, None, fitness=0.0, rank=order.rank - 1, generation=None)
+        Individual(parent, b"", fitness=0.0, rank=order.rank - 1, generation=None)
         for parent in order.parents
     )
-    return Candidate(birth, 0, couple or None, genome, robot)
+    return Candidate(birth, 0, couple or None, made.genome, robot, made.connections)

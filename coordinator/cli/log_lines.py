@@ -15,13 +15,12 @@ from coordinator.islands.events import (
     Insert,
     JournalledEvent,
     Order,
-    Verdict,
-    Vetted,
 )
 from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Casualty, Judgement
+from schema.wire.messages import Bred
 
 _LINE = "{:>6}  {:<17}  {:>6}  {:<8}  {:>3}  {}"
 HEADER = _LINE.format("record", "event", "island", "birth", "try", "details")
@@ -34,8 +33,8 @@ _DETAILS = {
     "fitness": "fitness {:.4f}",
     "age_s": "age {:.1f} s",
     "simulated_s": "{:.1f} s simulated",
-    "motors": "motors {}",
-    "mass": "{:.3f} kg",
+    "parts": "parts {}",
+    "failed": "failed: {}",
     "advance": "advance {}",
     "order": "{}",
     "step": "step {}",
@@ -110,17 +109,22 @@ def _words(named: object) -> str:
 def _answer(event: Answered) -> Fields:
     if isinstance(event, Asked):
         return {"request": event.number, "trials": len(event.points)}
-    if not isinstance(event, Verdict):
-        evaluation = event.evaluation
-        outcome = asdict(evaluation) if evaluation else {"reason": event.reason}
-        return {"trial": event.trial, **outcome, **_worker(event.provenance)}
-    fields: Fields = {"attempt": event.attempt}
-    if not isinstance(event, Vetted):
-        return {**fields, "reason": event.reason}
-    report = event.report
-    fields["verdict"] = "viable" if report.is_viable else "not viable"
-    fields |= {"motors": report.motors, "mass": report.mass}
-    return fields if report.is_viable else {**fields, "reason": report.reason}
+    if isinstance(event, Bred):
+        return _bred(event)
+    evaluation = event.evaluation
+    outcome = asdict(evaluation) if evaluation else {"reason": event.reason}
+    return {"trial": event.trial, **outcome, **_worker(event.provenance)}
+
+
+def _bred(event: Bred) -> Fields:
+    """Return the fields of a birth: its last attempt, and why those before failed."""
+    child, failed = event.child, event.attempt + len(event.reasons)
+    fields: Fields = {"attempt": failed - (child is None)}
+    if child is None:
+        fields["verdict"] = "no child"
+    else:
+        fields |= {"verdict": "viable", "parts": len(child.robot.parts)}
+    return {**fields, "failed": [*event.reasons]} if event.reasons else fields
 
 
 def _audit(event: Audited) -> Fields:

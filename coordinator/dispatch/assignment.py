@@ -28,15 +28,15 @@ from coordinator.dispatch.pool import (
 )
 
 AGENT_OF: dict[JobKind, AgentKind] = {
-    "vet": "analyzer",
+    "breed": "analyzer",
     "evaluate": "worker",
     "call": "worker",
     "advance": "worker",
 }
 LEAST_S = 1.0
 """A job is never late before this time [s]: a second copy would cost more."""
-VETS_AT_HAND = 16
-"""Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
+BIRTHS_AT_HAND = 16
+"""Births that an analyzer holds beyond the current one: some milliseconds' work."""
 CALL_S = 2.0 * FIRST_S
 """No agent is asked about a call before this time [s]: calls differ in duration."""
 COPY_GROWTH = 16.0
@@ -67,7 +67,7 @@ class Assignment:
         self.homes = Homes(self.workers, allows_drift=allows_drift)
         self._pools: dict[AgentKind, Pool] = {
             "worker": self.workers,
-            "analyzer": Pool(VETS_AT_HAND),
+            "analyzer": Pool(BIRTHS_AT_HAND),
         }
         self._pool_of: dict[str, Pool] = {}
         self._deadlines = Deadlines(LEAST_S)

@@ -13,7 +13,7 @@ from schema.wire.messages import Crash
 AgentKind = Literal["worker", "analyzer"]
 KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 
-JobKind = Literal["vet", "evaluate", "call", "advance"]
+JobKind = Literal["breed", "evaluate", "call", "advance"]
 
 Read = Callable[[bytes], object]
 """Decodes an answer and checks it; raises ``MalformedMessage`` if it is unfit."""
@@ -36,7 +36,7 @@ class Job:
     Attributes:
         number: unique within the process, ascending; an advance gets another one each
             time that it is assigned.
-        kind: "vet" goes to analyzers, the others to workers.
+        kind: "breed" goes to analyzers, the others to workers.
         payload: the encoded request; empty for an advance, whose request depends on
             its worker.
         paired: number of the same request's other job, which another agent does if

@@ -1,13 +1,13 @@
-"""Individuals, the candidates that become individuals, and the source of candidates.
+"""Individuals, the candidates that become individuals, and requests for candidates.
 
-Every candidate is a pure function of seed, run, birth, attempt and population.
-Attempts are numbered through all couples of a birth, so that each has its own stream.
+Every candidate is a pure function of seed, run, birth, attempt and parents; analyzers
+make it (``coordinator.evolution.newborns``). Attempts are numbered through all couples
+of a birth, so that each has its own stream.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from math import inf
 from types import MappingProxyType
 
 from msgspec import Struct
@@ -19,11 +19,12 @@ from coordinator.evolution.members import Relatives
 from coordinator.evolution.random_streams import Purpose, stream
 from coordinator.evolution.rules import Rule, rule_of, select_parents, select_survivors
 from coordinator.evolution.selection import cull_population
-from schema.errors import ExperimentError, InvalidRobot
+from schema.errors import ExperimentError
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, failed_fitness
 from schema.robot.robot import Robot
+from schema.wire.messages import Bred, Breed
 
 NO_MEASURES: Mapping[str, float] = MappingProxyType({})
 _COUPLES = 100
@@ -34,7 +35,7 @@ class Individual(Struct, frozen=True):
     """Member of a population.
 
     Attributes:
-        genome: what its children inherit, of the type that the encoding uses.
+        genome: bytes of what its children inherit.
         fitness: always maximised; where its evaluation failed 0, or the least of its
             population below 0.
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
@@ -48,7 +49,7 @@ class Individual(Struct, frozen=True):
     """
 
     birth: BirthId
-    genome: object
+    genome: bytes
     fitness: float
     rank: int
     generation: int | None
@@ -115,6 +116,7 @@ class Candidate(Struct, frozen=True):
     Attributes:
         attempt: number of the attempt that gave this candidate, from 0.
         couple: its parents; None for a random robot.
+        connections: of its brain in the genome, unresolved ones included.
         learnt: as of ``Individual``.
         origin: the given founder that it is, if it is one.
     """
@@ -122,8 +124,9 @@ class Candidate(Struct, frozen=True):
     birth: BirthId
     attempt: int
     couple: Couple | None
-    genome: object
+    genome: bytes
     robot: Robot
+    connections: int
     learnt: Robot | None = None
     origin: Founder | None = None
 
@@ -143,7 +146,7 @@ class Candidate(Struct, frozen=True):
 
 
 class Breeder:
-    """Source of candidates and selector of survivors for one island and run.
+    """Selector of parents and survivors for one island and run.
 
     What fails in a rule or an encoding is an ``ExperimentError`` that names the birth.
     ``emigrants`` is an own rule that selects them; None for a built-in one.
@@ -155,9 +158,8 @@ class Breeder:
         """Initialise; ``given`` are the founders of the first births."""
         self._experiment = experiment
         self._founders = given
-        self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
-        self._relatives = relatives = Relatives(self._encoding.develop)
+        self._relatives = relatives = Relatives(encoding_of(experiment).robot_of)
         self._parents_rule = rule_of(experiment, "parents", relatives)
         self._survivors_rule = rule_of(experiment, "survivors", relatives)
         self.emigrants: Rule | None = None
@@ -167,85 +169,61 @@ class Breeder:
         rules = (self._parents_rule, self._survivors_rule, self.emigrants)
         self._own = [rule for rule in rules if rule is not None and rule.relatives]
 
-    def candidate(
+    def request(
         self,
         birth: BirthId,
         attempt: int,
         population: Sequence[Individual],
-        couple: Couple | None = None,
         why: str = "",
         *,
-        end: float = inf,
         is_chosen: bool = False,
-    ) -> Candidate | None:
-        """Return the candidate of the first attempt that gives one; None: ``end`` came.
+    ) -> tuple[Breed, Couple | None]:
+        """Return the request for a child of one couple, or a random robot.
 
-        Attempts are numbered from 0, through all couples. The population has the
-        possible parents, and none for a founder; if ``is_chosen``, it is the parents,
-        two or one. Of the attempt before, ``couple`` has the parents, ``why`` the
-        reason why it failed.
+        It has the attempts from one on, numbered from 0 through all couples, up to the
+        next ``max_mating_attempts``. The population has the possible parents, and none
+        for a founder; if ``is_chosen``, it is the parents, two or one. ``why`` is the
+        reason why the attempt before failed. Also returns the parents, None for a robot
+        without any.
 
         Raises:
-            ExperimentError: (nearly) no robot meets the restrictions, or an encoding's
-                own code fails.
-        """
-        with at_birth(birth):
-            if birth.number < len(self._founders):
-                return self._given(birth, attempt, why)
-            while attempt < end:
-                self.check_attempts(attempt, population, why)
-                couple, genome = self.conceive(
-                    birth, attempt, population, couple, is_chosen=is_chosen
-                )
-                why = self._encoding.no_child
-                if genome is not None:
-                    try:
-                        robot = self._encoding.develop(genome)
-                    except InvalidRobot as error:
-                        why = str(error)
-                    else:
-                        return Candidate(birth, attempt, couple, genome, robot)
-                attempt += 1
-        return None
-
-    def _given(self, birth: BirthId, attempt: int, why: str) -> Candidate:
-        """Return the given founder of a birth, at its only attempt."""
-        if attempt:
-            raise ExperimentError(f"the given founder is not viable: {why}")
-        founder = self._founders[birth.number]
-        genome = self._encoding.from_bytes(founder[1].genome)
-        robot = self._encoding.develop(genome)
-        return Candidate(birth, 0, None, genome, robot, origin=founder)
-
-    def conceive(
-        self,
-        birth: BirthId,
-        attempt: int,
-        population: Sequence[Individual],
-        couple: Couple | None,
-        *,
-        is_chosen: bool = False,
-    ) -> tuple[Couple | None, object | None]:
-        """Return the parents of one attempt and the genome of their child.
-
-        Arguments and errors are as of ``candidate``. After ``max_mating_attempts`` new
-        parents are selected. A random robot has none; the genome is None if mating
-        failed.
+            ExperimentError: (nearly) no robot meets the restrictions, a given founder
+                is not viable, or a rule of selection fails.
         """
         selection = self._experiment.selection
-        if is_chosen:
-            couple = tuple(population)
-        elif self._is_random(population):
-            rng = self._stream(birth, attempt, Purpose.GENERATE)
-            return None, self._encoding.random(rng, birth)
-        elif couple is None or attempt % selection.max_mating_attempts == 0:
-            rng = self._stream(birth, attempt, Purpose.PARENTS)
-            couple = select_parents(population, rng, self._parents_rule)
-        rng = self._stream(birth, attempt, Purpose.MATE)
-        first, last = couple[0].genome, couple[-1].genome
-        return couple, self._encoding.mate(first, last, rng, birth)
+        with at_birth(birth):
+            if (founder := self._founder(birth)) is not None:
+                if attempt:
+                    raise ExperimentError(f"the given founder is not viable: {why}")
+                return Breed(birth, 0, 1, founder=founder[1].genome), None
+            self._check_attempts(attempt, population, why)
+            most = selection.max_mating_attempts
+            end = (attempt // most + 1) * most
+            if is_chosen:
+                couple = tuple(population)
+            elif self._is_random(population):
+                end = min(end, self._experiment.generation.max_tries)
+                return Breed(birth, attempt, end), None
+            else:
+                rng = self._stream(birth, attempt, Purpose.PARENTS)
+                couple = select_parents(population, rng, self._parents_rule)
+        return Breed(birth, attempt, end, tuple(one.genome for one in couple)), couple
 
-    def check_attempts(
+    def candidate(self, bred: Bred, couple: Couple | None) -> Candidate | None:
+        """Return the candidate that was bred for a couple; None if there is none."""
+        birth, child = bred.birth, bred.child
+        if child is None:
+            return None
+        attempt, origin = bred.attempt + len(bred.reasons), self._founder(birth)
+        made = child.genome, child.robot, child.connections
+        return Candidate(birth, attempt, couple, *made, origin=origin)
+
+    def _founder(self, birth: BirthId) -> Founder | None:
+        """Return the given founder of a birth, if there is one."""
+        founders = self._founders
+        return founders[birth.number] if birth.number < len(founders) else None
+
+    def _check_attempts(
         self, attempts: int, population: Sequence[Individual], why: str
     ) -> None:
         """Raise if too many attempts at a birth have failed.

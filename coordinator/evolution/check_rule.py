@@ -51,7 +51,8 @@ def _examples(encoding: IslandEncoding, labels: Labels) -> list[Individual]:
         measures: Mapping[str, float] = defaultdict(partial(float, number / 7))
         if labels is not None:
             measures = dict.fromkeys(labels, number / 7)
-        one = Individual(birth, genome, 0.0, rank=1 + number // 4, generation=0)
+        data = encoding.to_bytes(genome)
+        one = Individual(birth, data, 0.0, rank=1 + number // 4, generation=0)
         size = len(encoding.develop(genome).parts)
         examples.append(replace(one, size=size, measures=MappingProxyType(measures)))
     return examples
@@ -140,7 +141,7 @@ def check_rule(
     """
     encoding = encoding_of(experiment)
     examples = _examples(encoding, labels)
-    new = partial(make, Relatives(encoding.develop))
+    new = partial(make, Relatives(encoding.robot_of))
     last = new()  # imports its module
     least, count = _ASKED[last.key]
     if last.varies:

@@ -1,4 +1,7 @@
-"""The encoding of an island: loading, and checks of what it returns."""
+"""The encoding of an island: loading, and checks of what it returns.
+
+A coordinator has genomes as bytes; who breeds decodes them, once.
+"""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -20,10 +23,12 @@ from schema.plugins.origin import naming_plugin
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
 from schema.robot.brain import Brain
-from schema.robot.genome import Node
+from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import with_brain
 from schema.robot.robot import Robot, check_robot
+from schema.wire.messages import Newborn
+from schema.wire.protobuf import count_nodes
 
 WHERE = "encoding.type"
 BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
@@ -32,6 +37,7 @@ BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
 }
 """Built-in encodings by their short names."""
 
+_MOST_KEPT = 1024
 METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
 """Methods that an own encoding must have."""
 
@@ -84,6 +90,8 @@ class IslandEncoding:
         self.name = experiment.encoding.type
         self.types, self._kinds = types_of(experiment)
         self._encoding = encoding
+        self._space = experiment.space
+        self._kept: dict[bytes, object] = {}
         self.stores_robots = self.name != REVOLVE_ANGLE
         self.no_child = "its parents' genomes gave no child"
         code: RevolveAngle | _CheckedCode = _CheckedCode(encoding, self, experiment)
@@ -111,6 +119,55 @@ class IslandEncoding:
                 f"not a genome of encoding {self.name!r}: {one_line(error)}"
             ) from error
 
+    def kept(self, data: bytes) -> object:
+        """Return the genome of some bytes, decoded once; errors as of ``from_bytes``.
+
+        Most parents were bred by this process.
+        """
+        if data not in self._kept:
+            self._keep(data, self.from_bytes(data))
+        return self._kept[data]
+
+    def _keep(self, data: bytes, genome: object) -> None:
+        if len(self._kept) >= _MOST_KEPT:
+            self._kept.clear()
+        self._kept[data] = genome
+
+    def newborn(self, genome: object, robot: Robot) -> Newborn:
+        """Return what is known of a viable robot that develops from a genome."""
+        data = self.to_bytes(genome)
+        self._keep(data, genome)
+        connections = len(robot.brain.connections)
+        if isinstance(genome, Node):
+            connections = sum(len(node.connections) for node, _, _ in walk(genome))
+        return Newborn(data, robot, connections)
+
+    def check_newborn(self, newborn: Newborn) -> None:
+        """Raise unless a newborn of another process can live in the experiment.
+
+        That its genome is a child of its parents, and develops into the robot, is not
+        checked.
+
+        Raises:
+            InvalidRobot: no robot of the experiment.
+            MalformedMessage: no genome, of the thesis's encoding.
+        """
+        robot = newborn.robot
+        self.check(robot)
+        problem = outside_limits(robot, self._space, self.types)
+        if not self.stores_robots and count_nodes(newborn.genome) != len(robot.parts):
+            problem = "its genome has another number of parts than its robot"
+        if problem:
+            raise InvalidRobot(problem)
+
+    def robot_of(self, data: bytes) -> Robot:
+        """Return the robot that develops from the bytes of a genome.
+
+        Raises:
+            InvalidRobot: other bytes, or as of ``develop``.
+        """
+        return self.develop(self.from_bytes(data))
+
     def from_robot(self, robot: Robot) -> object:
         """Return a genome of a robot.
 
@@ -129,15 +186,18 @@ class IslandEncoding:
                 f"encoding {self.name!r} cannot describe this robot: {error}"
             ) from error
 
-    def with_brain(self, genome: object, robot: Robot) -> object:
-        """Return the genome of a robot at birth with the brain that it has learnt.
+    def with_brain(self, data: bytes, robot: Robot) -> Newborn:
+        """Return a robot at birth with the brain that it has learnt in its genome.
+
+        ``data``: the genome that it inherited.
 
         Raises:
             InvalidRobot: the encoding cannot describe the robot.
         """
-        if not self.stores_robots:
-            return with_brain(cast("Node", genome), robot, self.types)
-        return self.from_robot(robot)
+        if self.stores_robots:
+            return self.newborn(self.from_robot(robot), robot)
+        genome = cast("Node", self.kept(data))
+        return self.newborn(with_brain(genome, robot, self.types), robot)
 
     @property
     def describes_robots(self) -> bool:

@@ -11,10 +11,10 @@ from coordinator.evolution.learners.learner import Batch, Points
 from schema.limits import Finite, printable
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation, Provenance
 from schema.wire.arena import Advance, AdvanceShard
 from schema.wire.codec import Message
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Bred, Breed, Evaluate
 
 QUARANTINED = "quarantined: "
 """Begin of the reason of a failed evaluation that crashed its workers' processes."""
@@ -40,26 +40,6 @@ def brief(event: Message | str) -> str:
 
 class Started(Message, frozen=True):
     """The run starts; the first event, once."""
-
-
-class Vetted(Message, frozen=True, tag=True):
-    """The analyzer reported on a candidate's body."""
-
-    birth: BirthId
-    attempt: int
-    report: Report
-
-
-class VettingFailed(Message, frozen=True, tag=True):
-    """The analyzer failed on a candidate and would fail again."""
-
-    birth: BirthId
-    attempt: int
-    reason: str
-
-
-Verdict = Vetted | VettingFailed
-"""Answers to a request to vet a candidate."""
 
 
 class Evaluated(Message, frozen=True, tag=True):
@@ -243,7 +223,7 @@ class Audited(Message, frozen=True, tag=True):
         return self.agrees or are_quarantined
 
 
-Answered = Verdict | Outcome | Asked
+Answered = Bred | Outcome | Asked
 """Events that answer a request of an island; an arena requests no evaluation."""
 
 ExternalEvent = Answered | Advanced | Commanded
@@ -254,7 +234,7 @@ JournalledEvent = ExternalEvent | Audited
 
 IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Verdict | Asked | Advanced | Commanded | MigrationEvent
+ArenaEvent = Started | Bred | Asked | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 
@@ -316,6 +296,6 @@ class Finish(Message, frozen=True):
     neighbours: tuple[int, ...] = ()
 
 
-IslandCommand = Vet | Evaluate | Ask | Record | Emigrate | Finish
+IslandCommand = Breed | Evaluate | Ask | Record | Emigrate | Finish
 
-ArenaCommand = Vet | Ask | AdvanceShard | Record | Append | Emigrate | Finish
+ArenaCommand = Breed | Ask | AdvanceShard | Record | Append | Emigrate | Finish

@@ -28,9 +28,6 @@ from coordinator.islands.events import (
     Outcome,
     Record,
     Started,
-    Verdict,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.learning import IslandLearning, NewbornLearning
@@ -49,7 +46,7 @@ from coordinator.islands.rows import (
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Bred, Breed, Evaluate
 
 
 @dataclass(slots=True)
@@ -57,14 +54,16 @@ class _Birth:
     """Birth in flight.
 
     Attributes:
-        candidate: candidate of the current attempt.
-        is_viable: the candidate has passed vetting.
+        request: for its candidate, of the current couple.
+        couple: its parents; None for a robot without any.
+        candidate: that was bred; None until one is viable.
         outcome: its evaluation; None until it has arrived.
         learning: its trials; None without learning, and before it is viable.
     """
 
-    candidate: Candidate
-    is_viable: bool = False
+    request: Breed
+    couple: Couple | None
+    candidate: Candidate | None = None
     outcome: Outcome | None = None
     learning: NewbornLearning | None = None
 
@@ -120,8 +119,7 @@ class Island:
         self._in_flight: dict[int, _Birth] = {}
         self._handlers: dict[type, Callable[[Any], list[IslandCommand]]] = {
             Started: self._started,
-            Vetted: self._vetted,
-            VettingFailed: self._vetted,
+            Bred: self._bred,
             Evaluated: self._evaluated,
             EvaluationFailed: self._evaluated,
             Asked: self._learnt,
@@ -166,20 +164,19 @@ class Island:
             raise self._unexpected(event, "it has started before")
         return self._proceed()
 
-    def _vetted(self, event: Verdict) -> list[IslandCommand]:
+    def _bred(self, event: Bred) -> list[IslandCommand]:
         newborn = self._newborn(event)
         if newborn is None:
             return []
-        candidate = newborn.candidate
-        if event.attempt > candidate.attempt:
-            raise self._unexpected(event, f"it is at attempt {candidate.attempt}")
-        if event.attempt < candidate.attempt or newborn.is_viable:
+        request = newborn.request
+        if event.attempt > request.attempt:
+            raise self._unexpected(event, f"it is at attempt {request.attempt}")
+        if event.attempt < request.attempt or newborn.candidate is not None:
             return []
-        if not (isinstance(event, Vetted) and event.report.is_viable):
-            attempt, couple = candidate.attempt + 1, candidate.couple
-            why = event.report.reason if isinstance(event, Vetted) else event.reason
-            return [self._begin(event.birth, attempt, couple, why)]
-        newborn.is_viable = True
+        candidate = self._breeder.candidate(event, newborn.couple)
+        if candidate is None:
+            return [self._begin(event.birth, request.end, event.why)]
+        newborn.candidate = candidate
         if self._learning is None:
             return [Evaluate(candidate.birth, candidate.robot)]
         newborn.learning = NewbornLearning(candidate, self._learning)
@@ -222,8 +219,8 @@ class Island:
         newborn = self._in_flight.get(birth.number)
         if newborn is None or newborn.outcome is not None:
             return None
-        if not (newborn.is_viable or isinstance(event, Verdict)):
-            raise self._unexpected(event, "it has not been vetted")
+        if newborn.candidate is None and not isinstance(event, Bred):
+            raise self._unexpected(event, "it has not been bred")
         return newborn
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
@@ -249,25 +246,17 @@ class Island:
             commands.append(self._begin(BirthId(self._number, self._begun - 1)))
         return commands
 
-    def _begin(
-        self,
-        birth: BirthId,
-        attempt: int = 0,
-        couple: Couple | None = None,
-        why: str = "",
-    ) -> Vet:
-        """Begin a birth, or its next attempt; arguments as of ``Breeder.candidate``."""
-        candidate = self._breeder.candidate(
-            birth, attempt, self.population, couple, why
-        )
-        assert candidate is not None
-        self._in_flight[birth.number] = _Birth(candidate)
-        return Vet(birth, candidate.attempt, candidate.robot)
+    def _begin(self, birth: BirthId, attempt: int = 0, why: str = "") -> Breed:
+        """Begin a birth, or go on with new parents; as ``Breeder.request``."""
+        begun = self._breeder.request(birth, attempt, self.population, why)
+        self._in_flight[birth.number] = _Birth(*begun)
+        return begun[0]
 
     def _commit(self, newborn: _Birth, outcome: Outcome) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
         candidate = newborn.candidate
+        assert candidate is not None
         individual = candidate.individual(self._generation).evaluated(
             outcome.evaluation, self._labels
         )

@@ -29,7 +29,7 @@ class IslandMigration:
         self._breeder = breeder if migration.replaced == "rule" else None
         self.epochs = epochs
         self._labels = experiment.measures.labels
-        self._develop = encoding_of(experiment).develop
+        self._develop = encoding_of(experiment).robot_of
         rules = selection.culling
         self._limit = rules.population_limit if rules else selection.population
         self._stay = selection.parents_needed

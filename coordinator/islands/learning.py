@@ -57,8 +57,13 @@ class IslandLearning:
         if robot is candidate.robot:
             return candidate
         if self._is_lamarckian:
-            genome = self._encoding.with_brain(candidate.genome, robot)
-            return replace(candidate, genome=genome, robot=robot)
+            grown = self._encoding.with_brain(candidate.genome, robot)
+            return replace(
+                candidate,
+                genome=grown.genome,
+                robot=robot,
+                connections=grown.connections,
+            )
         return replace(candidate, learnt=robot)
 
 

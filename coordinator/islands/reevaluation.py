@@ -62,7 +62,7 @@ class Reevaluations:
         assert rules is not None
         self._rules = rules
         self._labels = experiment.measures.labels
-        self._develop = encoding_of(experiment).develop
+        self._develop = encoding_of(experiment).robot_of
         self._island = island
         self._founders = experiment.selection.population
         self._due_births = self._founders + rules.interval

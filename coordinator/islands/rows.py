@@ -3,12 +3,11 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from coordinator.evolution.breeding import Candidate, Individual, at_birth
+from coordinator.evolution.breeding import Candidate, Individual
 from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.founders import Founder
 from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
-from schema.robot.genome import Node, walk
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.columns import Row
@@ -36,8 +35,6 @@ def birth_record(
 
     On-line it has its simulated time [s] and its place in the ground plane [m].
     """
-    with at_birth(candidate.birth):
-        genome = encoding.to_bytes(candidate.genome)
     stored = candidate.learnt
     if stored is None and encoding.stores_robots:
         stored = candidate.robot
@@ -48,9 +45,10 @@ def birth_record(
         "generation": individual.generation,
         "rank": individual.rank,
         "attempts": candidate.attempt + 1,
-        "genome": genome,
+        "genome": candidate.genome,
         "body": body_rows(candidate.robot),
-        **sizes(candidate.robot, candidate.genome, encoding.types),
+        **sizes(candidate.robot, encoding.types),
+        "connections": candidate.connections,
         "sim_time_s": sim_time_s,
         "x": place and place[0],
         "y": place and place[1],
@@ -94,20 +92,15 @@ def body_rows(robot: Robot) -> list[Row]:
     ]
 
 
-def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
+def sizes(robot: Robot, space: BodySpace) -> dict[str, int]:
     """Return the counts of a births row.
 
     They are ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
-    (parts without children; a lone core counts 1), ``inputs``, ``outputs``, ``hidden``,
-    and ``connections`` of a genome of ``revolve-angle``, including unresolved ones; of
-    another genome's robot.
+    (parts without children; a lone core counts 1), ``inputs``, ``outputs`` and
+    ``hidden``.
 
     Source: thesis section 6.3; the code of the original.
     """
-    brain = robot.brain
-    connections = len(brain.connections)
-    if isinstance(genome, Node):
-        connections = sum(len(node.connections) for node, _, _ in walk(genome))
     motors = passive = 0
     for part in robot.parts:
         kind = space[part.kind]
@@ -115,7 +108,7 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
             motors += 1
         elif kind.shape(part.parameters).joint is not None:
             passive += 1
-    layers = [neuron.layer for neuron in brain.neurons]
+    layers = [neuron.layer for neuron in robot.brain.neurons]
     # Includes -1, the parent of the core.
     parents = {part.parent for part in robot.parts}
     return {
@@ -126,7 +119,6 @@ def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
         "inputs": layers.count("input"),
         "outputs": layers.count("output"),
         "hidden": layers.count("hidden"),
-        "connections": connections,
     }
 
 

@@ -1,8 +1,9 @@
-"""Cross-checks: evaluations that two workers do, to compare the results.
+"""Cross-checks: evaluations that two workers do, to compare the results; and breeding.
 
 The birth decides whether an evaluation is checked, so that a resumed run checks the
 same ones. A check changes no birth: equal answers count as one, and different answers
-stop the run, as it is unknown which of them is right.
+stop the run, as it is unknown which of them is right. What an analyzer breeds is bred
+again in this process; another answer is refused.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ from hashlib import sha256
 
 from coordinator.islands.events import Answered, Audited, Outcome, Record
 from coordinator.islands.rows import outcome_columns
-from schema.wire.messages import Evaluate
+from schema.agent.request_handler import Compute
+from schema.robot.ids import BirthId
 
 _WHOLE = 2**32
 
@@ -20,12 +22,23 @@ class Checks:
     """Checks that a user wants; none of them changes a birth.
 
     Attributes:
-        audit: share of evaluations that two workers do.
+        audit: share of evaluations that two workers do, and of children that are bred
+            twice.
         pauses: the run stops when a robot is quarantined, until it is resumed.
+        breed: answers a request to breed in this process, to compare.
     """
 
     audit: float = 0.0
     pauses: bool = False
+    breed: Compute | None = None
+
+    def chooses(self, birth: BirthId, number: int) -> bool:
+        """Return whether a trial or an attempt at a birth is checked."""
+        if not self.audit:
+            return False
+        name = f"{birth.island}/{birth.number}/{number}"
+        digest = sha256(name.encode()).digest()
+        return int.from_bytes(digest[:4]) < self.audit * _WHOLE
 
 
 NO_CHECKS = Checks()
@@ -35,18 +48,9 @@ NO_CHECKS = Checks()
 class CrossChecks:
     """Evaluations of a run that are done twice."""
 
-    def __init__(self, share: float) -> None:
-        """Initialise the checks of a share of the evaluations, from 0 to 1."""
-        self._share = share
+    def __init__(self) -> None:
         self._others: dict[int, int] = {}
         self._outcomes: dict[int, Outcome] = {}
-
-    def chooses(self, command: Evaluate) -> bool:
-        """Return whether an evaluation is done twice."""
-        birth = command.birth
-        name = f"{birth.island}/{birth.number}/{command.trial}"
-        digest = sha256(name.encode()).digest()
-        return int.from_bytes(digest[:4]) < self._share * _WHOLE
 
     def pair(self, first: int, second: int) -> None:
         """Note the numbers of two jobs that are the same evaluation."""

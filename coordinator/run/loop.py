@@ -49,9 +49,9 @@ from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
 from schema.wire.arena import AdvanceShard
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Breed, Evaluate
 
-Request = Vet | Evaluate | AdvanceShard | Ask
+Request = Breed | Evaluate | AdvanceShard | Ask
 """Commands of islands and arenas that agents or learners carry out."""
 
 Question = Request | tuple[AdvanceShard | None, int]
@@ -102,11 +102,11 @@ class Loop:
         self.shard_requests = ShardRequests(
             context, self.snapshot_store, fleet, self.parts
         )
-        self._requests = Requests(context, fleet, self.checks.audit)
+        self._requests = Requests(context, fleet, self.checks)
         self._learners = Learners(context.experiments, context.origin)
         self._now_s = 0.0
         self._recent: deque[Event | str] = deque(maxlen=_RECENT)
-        self._unanswered: dict[Key, Vet | Evaluate | Ask] = {}
+        self._unanswered: dict[Key, Breed | Evaluate | Ask] = {}
 
     @property
     def is_finished(self) -> bool:
@@ -292,7 +292,7 @@ class Loop:
                         self._write(command)
                     case Append(advanced) if self.rows is not None:
                         self.rows.append(advanced)
-                    case Vet() | Evaluate() | AdvanceShard() | Ask():
+                    case Breed() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))

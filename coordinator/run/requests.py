@@ -1,17 +1,18 @@
-"""Vetting and evaluation requests of a run, checks of their answers, and the results.
+"""Breeding and evaluation requests of a run, checks of their answers, and the results.
 
 An answer that passes is one that a correct agent may give. A wrong value that is
 plausible is not found here; cross-checks find it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from types import UnionType
 
 from msgspec import structs
 
-from coordinator.dispatch.events import Deliver, Job, JobKind
+from coordinator.dispatch.events import Deliver, Job
 from coordinator.dispatch.fleet import JobRouter
+from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.islands.events import (
     QUARANTINED,
     Advanced,
@@ -23,37 +24,39 @@ from coordinator.islands.events import (
     Evaluated,
     EvaluationFailed,
     ExternalEvent,
-    Vetted,
-    VettingFailed,
 )
-from coordinator.run.cross_checks import CrossChecks
+from coordinator.run.cross_checks import NO_CHECKS, Checks, CrossChecks
 from coordinator.run.run_context import RunContext
-from schema.errors import NO_MESSAGE, JobRefused, MalformedMessage
-from schema.experiment.identity import NO_ORIGIN
+from schema.agent.request_handler import Compute
+from schema.errors import (
+    NO_MESSAGE,
+    ExperimentError,
+    InvalidRobot,
+    JobRefused,
+    MalformedMessage,
+)
 from schema.limits import (
     ANSWER_BYTES,
+    BRED_BYTES,
     LONGEST_REASON,
-    MOST_PAIRS,
-    PAIR_BYTES,
     TRACE_BYTES,
     printable,
 )
 from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation, Provenance
 from schema.wire.codec import decode, encode
 from schema.wire.messages import (
     Answer,
+    Bred,
+    Breed,
     Evaluate,
     Failure,
     Request,
     Result,
     Traced,
-    Vet,
 )
 from schema.wire.trace import check_trace
-
-VETTING_BYTES = ANSWER_BYTES + MOST_PAIRS * PAIR_BYTES
 
 Key = tuple[str, int, BirthId, int]
 """Identifies an open request: kind, requester, birth, number of its attempt."""
@@ -63,49 +66,67 @@ Expected = tuple[int, int]
 
 
 class Requests:
-    """The vetting and evaluation requests of all islands of a run."""
+    """The breeding and evaluation requests of all islands of a run."""
 
-    def __init__(self, context: RunContext, fleet: JobRouter, audit: float) -> None:
+    def __init__(
+        self, context: RunContext, fleet: JobRouter, checks: Checks = NO_CHECKS
+    ) -> None:
         """Initialise without requests.
 
-        ``audit``: share of evaluations that are done twice.
+        ``checks``: what of them is done twice.
         """
-        self._cross_checks = CrossChecks(audit) if audit else None
+        self._checks, self._cross_checks = checks, CrossChecks()
         self._context = context
         self._fleet = fleet
 
-    def send(self, command: Vet | Evaluate) -> None:
-        """Request the vetting or evaluation of a robot."""
-        context = self._context
-        if isinstance(command, Vet):
-            kind: JobKind = "vet"
-            settings, origin, simulated_s = context.vetting, NO_ORIGIN, 0.0
-            read: Callable[..., Answer] = read_vetting
+    def send(self, command: Breed | Evaluate) -> None:
+        """Request the breeding of a child or the evaluation of a robot."""
+        if isinstance(command, Breed):
+            self._breed(command)
         else:
-            kind = "evaluate"
-            requester = requester_of(command)
-            settings = context.evaluation[requester]
-            origin = structs.replace(context.origin, island=requester)
-            experiment = context.experiments[requester]
-            clock, measures = experiment.simulation, experiment.measures.names
-            simulated_s = (command.steps or clock.evaluation_steps) * clock.timestep_s
-            read = partial(read_evaluation, measures=len(measures))
-        run, epoch = context.client
-        for number, paired in self._numbers(command):
-            request = Request(
-                run, epoch, number, command, settings, plugins_of(settings), origin
-            )
-            own_read = partial(read, expected=(epoch, number))
-            about = (context.client, command, own_read, simulated_s)
-            self._fleet.request(Job(number, kind, encode(request), paired, *about))
+            self._evaluate(command)
 
-    def _numbers(self, command: Vet | Evaluate) -> list[tuple[int, int]]:
+    def _breed(self, work: Breed) -> None:
+        context, checks = self._context, self._checks
+        island, number = work.birth.island, self._fleet.new_number()
+        settings, needs = context.breeding[island]
+        request = self._request(number, work, settings, plugins_of(needs))
+        read = partial(
+            read_bred,
+            request=request,
+            encoding=encoding_of(context.experiments[island]),
+            again=checks.breed,
+            is_audited=checks.chooses(work.birth, work.attempt),
+        )
+        about = (-1, context.client, work, read, 0.0)
+        self._fleet.request(Job(number, "breed", encode(request), *about))
+
+    def _evaluate(self, work: Evaluate) -> None:
+        context, island = self._context, requester_of(work)
+        settings, experiment = context.evaluation[island], context.experiments[island]
+        clock, measures = experiment.simulation, experiment.measures.names
+        simulated_s = (work.steps or clock.evaluation_steps) * clock.timestep_s
+        for number, paired in self._numbers(work):
+            request = self._request(number, work, settings, plugins_of(settings))
+            expected = request.epoch, number
+            read = partial(read_evaluation, expected=expected, measures=len(measures))
+            about = (paired, context.client, work, read, simulated_s)
+            self._fleet.request(Job(number, "evaluate", encode(request), *about))
+
+    def _request(
+        self, number: int, work: Breed | Evaluate, settings: bytes, plugins: str
+    ) -> Request:
+        run, epoch = self._context.client
+        origin = structs.replace(self._context.origin, island=requester_of(work))
+        return Request(run, epoch, number, work, settings, plugins, origin)
+
+    def _numbers(self, work: Evaluate) -> list[tuple[int, int]]:
         """Return the number of each job of a request, and of its paired job or -1."""
-        first, checks = self._fleet.new_number(), self._cross_checks
-        if checks is None or isinstance(command, Vet) or not checks.chooses(command):
+        first = self._fleet.new_number()
+        if not self._checks.chooses(work.birth, work.trial):
             return [(first, -1)]
         second = self._fleet.new_number()
-        checks.pair(first, second)
+        self._cross_checks.pair(first, second)
         return [(first, second), (second, first)]
 
     def events(self, end: Deliver) -> list[Answered | Audited]:
@@ -113,16 +134,15 @@ class Requests:
 
         Raises:
             JobRefused: several agents cannot do the job; the run stops as it is.
+            ExperimentError: no analyzer can breed for this experiment.
         """
         event = _event(end)
-        if self._cross_checks is None:
-            return [event]
         return self._cross_checks.settle(end.job.number, event)
 
 
-def requester_of(about: Vet | Evaluate | Ask | Answered) -> int:
+def requester_of(about: Breed | Evaluate | Ask | Answered) -> int:
     """Return the island that requests something, or that is answered."""
-    if isinstance(about, Vet | Vetted | VettingFailed | Ask | Asked):
+    if isinstance(about, Breed | Bred | Ask | Asked):
         return about.birth.island
     return about.birth.island if about.requester is None else about.requester
 
@@ -134,29 +154,60 @@ def island_of(event: ExternalEvent) -> int:
     return requester_of(event)
 
 
-def key_of(about: Vet | Evaluate | Ask | Answered) -> Key:
+def key_of(about: Breed | Evaluate | Ask | Answered) -> Key:
     """Return what a request and its answer have in common."""
     if isinstance(about, Ask | Asked):
         return ("ask", about.birth.island, about.birth, about.number)
-    if isinstance(about, Vet | Vetted | VettingFailed):
-        return ("vet", about.birth.island, about.birth, about.attempt)
+    if isinstance(about, Breed | Bred):
+        return ("breed", about.birth.island, about.birth, about.attempt)
     return ("evaluate", requester_of(about), about.birth, about.trial)
 
 
-def read_vetting(data: bytes, *, expected: Expected) -> Answer:
-    """Return the decoded answer to a vetting: a report or a failure.
+def read_bred(
+    data: bytes,
+    *,
+    request: Request,
+    encoding: IslandEncoding,
+    again: Compute | None = None,
+    is_audited: bool = False,
+) -> Answer:
+    """Return the decoded answer to a request to breed.
 
-    ``expected``: epoch and number of the job.
+    ``again``: breeds in this process, to compare an audited answer, or a failure, which
+    ends the run; None: neither is compared.
 
     Raises:
-        MalformedMessage: not an answer, the answer to another request, or a report
-            with a reason although the body is viable, or without one.
+        MalformedMessage: not an answer, the answer to another request, another number
+            of attempts than there may be, a child that cannot live in the experiment,
+            or another one than ``again`` gives.
     """
-    answer = read_answer(data, expected, Report, VETTING_BYTES)
-    report = answer.result
-    if isinstance(report, Report) and report.is_viable == bool(report.reason):
-        raise impossible("report: exactly a body that is not viable has a reason")
+    answer = read_answer(data, (request.epoch, request.number), Bred, BRED_BYTES)
+    bred, work = answer.result, request.work
+    assert isinstance(work, Breed)
+    if isinstance(bred, Bred):
+        _check_bred(bred, work, encoding)
+        again = again if is_audited else None
+    if again is not None and again(request) != bred:
+        why = "bred another child than this coordinator, or none"
+        raise MalformedMessage(f"birth {work.birth.name}: {why}", "differs")
     return answer
+
+
+def _check_bred(bred: Bred, work: Breed, encoding: IslandEncoding) -> None:
+    """Raise ``MalformedMessage`` for an outcome that is none of a request to breed."""
+    if (bred.birth, bred.attempt) != (work.birth, work.attempt):
+        raise impossible(f"bred birth {bred.birth.name}, not {work.birth.name}")
+    most, tried = work.end - work.attempt, len(bred.reasons)
+    if bred.child is None:
+        if tried != most:
+            raise impossible(f"no child must take {most} attempts, got {tried}")
+        return
+    if tried >= most:
+        raise impossible(f"a child takes <= {most} attempts, got {tried + 1}")
+    try:
+        encoding.check_newborn(bred.child)
+    except InvalidRobot as error:
+        raise impossible(f"child: {error}") from None
 
 
 def read_evaluation(
@@ -233,9 +284,10 @@ def _event(end: Deliver) -> Answered:
 
     Raises:
         JobRefused: several agents cannot do it.
+        ExperimentError: no analyzer can breed for this experiment.
     """
     job, request, reason = end.job, end.job.subject, end.reason
-    assert isinstance(request, Vet | Evaluate)
+    assert isinstance(request, Breed | Evaluate)
     birth = request.birth
     if reason and not end.is_deadly:
         raise JobRefused(
@@ -244,15 +296,15 @@ def _event(end: Deliver) -> Answered:
         )
     answer = end.answer if isinstance(end.answer, Answer) else None
     result = answer.result if answer else None
+    if isinstance(request, Breed):
+        if isinstance(result, Failure):
+            raise ExperimentError(failure_of(result))
+        reasons = [f"the analyzer {reason}"] * (request.end - request.attempt)
+        if not isinstance(result, Bred):
+            return Bred(birth, request.attempt, tuple(reasons))
+        reasons = [printable(each, LONGEST_REASON) for each in result.reasons]
+        return structs.replace(result, reasons=tuple(reasons)) if reasons else result
     why = failure_of(result) if isinstance(result, Failure) else reason
-    if isinstance(request, Vet):
-        if isinstance(result, Report):
-            if result.reason:
-                words = printable(result.reason, LONGEST_REASON)
-                result = structs.replace(result, reason=words)
-            return Vetted(birth, request.attempt, result)
-        why = f"the analyzer {reason}" if reason else why
-        return VettingFailed(birth, request.attempt, why)
     wall_s = answer.wall_s if answer else 0.0
     provenance = Provenance(end.agent, end.platform, wall_s)
     about = provenance, request.trial, request.requester, request.point

@@ -11,8 +11,9 @@ from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
+    breeding_plugins,
+    breeding_settings,
     evaluation_settings,
-    vetting_settings,
 )
 from schema.parts import BodySpace
 from schema.plugins.source import plugins_of
@@ -28,14 +29,15 @@ class RunContext:
     Attributes:
         client: name of the run, and epoch of its coordinator.
         origin: seeds the noise; each request sets its own island.
-        vetting: settings for analyzers, as JSON.
+        breeding: settings for analyzers, and JSON that names the plug-ins which they
+            need, by island.
         evaluation, arena: settings for workers, as JSON, by island.
         experiments: settings of each island, for checks of answers.
     """
 
     client: Client
     origin: Origin
-    vetting: bytes
+    breeding: Mapping[int, tuple[bytes, bytes]]
     evaluation: Mapping[int, bytes]
     arena: Mapping[int, bytes]
     experiments: Mapping[int, Experiment]
@@ -54,7 +56,10 @@ class RunContext:
         return cls(
             Client(run, epoch),
             origin,
-            vetting_settings(experiment),
+            {
+                number: (breeding_settings(own), breeding_plugins(own))
+                for number, own in experiments.items()
+            },
             {number: evaluation_settings(own) for number, own in experiments.items()},
             {
                 number: arena_settings(own, structs.replace(origin, island=number))

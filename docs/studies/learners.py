@@ -22,9 +22,9 @@ from scipy import stats
 
 from analysis.comparison.statistics import mean_difference
 from analyzer.report import analyze
-from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from coordinator.evolution.learners.learner import Batch, NewbornLearner, Points
+from coordinator.evolution.newborns import founder
 from coordinator.evolution.random_streams import Purpose, stream
 from docs.studies.pages import (
     DOCS,
@@ -67,13 +67,12 @@ LEARNERS = {
 
 def random_bodies(count: int) -> list[Robot]:
     """Return the first random robots of scenario 1 that pass vetting."""
-    breeder, robots = Breeder(EXPERIMENT, 1, 0), list[Robot]()
+    robots = list[Robot]()
     types = body_space(EXPERIMENT.space)
     for number in range(10 * count):
-        candidate = breeder.candidate(BirthId(0, number), 0, ())
-        assert candidate is not None
-        if analyze(candidate.robot, types, Vetting()).is_viable:
-            robots.append(candidate.robot)
+        robot = founder(EXPERIMENT, 1, number)
+        if analyze(robot, types, Vetting()).is_viable:
+            robots.append(robot)
     return robots[:count]
 
 

@@ -19,7 +19,7 @@ COMMANDS = {
     "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
     "check": (_COORDINATOR, "check plug-ins as a run does"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
-    "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
+    "analyzer": ("analyzer.__main__", "breed and vet robots for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
     "robot pack": ("revolve.cli.pack", "write a robot and its settings to one file"),
     "robot page": ("analysis.__main__", "write robots to a page that plays them"),

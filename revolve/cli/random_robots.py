@@ -3,13 +3,13 @@
 from pathlib import Path
 
 from analyzer.report import analyze
-from coordinator.evolution.breeding import Breeder
+from coordinator.evolution.newborns import founder
 from schema.agent.flags import Flags, add_count, add_seed
 from schema.errors import counted
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.formats.files import settings_of, write_robot
-from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 
 
 def main(arguments: list[str]) -> int:
@@ -19,16 +19,13 @@ def main(arguments: list[str]) -> int:
     """
     options = parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
-    breeder = Breeder(experiment, options.seed, run=0)
     space, vetting = body_space(experiment.space), experiment.vetting
+
+    def why_not(robot: Robot, _attempt: int) -> str:
+        return "" if options.unvetted else analyze(robot, space, vetting).reason
+
     for number in range(options.count):
-        attempt, why, is_done = 0, "", False
-        while not is_done:
-            candidate = breeder.candidate(BirthId(0, number), attempt, (), why=why)
-            assert candidate is not None
-            attempt, robot = candidate.attempt + 1, candidate.robot
-            why = analyze(robot, space, vetting).reason
-            is_done = options.unvetted or not why
+        robot = founder(experiment, options.seed, number, why_not)
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")

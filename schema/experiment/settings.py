@@ -23,7 +23,6 @@ from schema.experiment.document import (
     Measures,
     Simulation,
     Space,
-    Vetting,
     body_space,
     light_of,
 )
@@ -58,13 +57,6 @@ _OFF_LINE = {
     "calibration": "robots of an arena have ideal sensors and motors",
 }
 """Keys that arenas do not have, and why."""
-
-
-class VettingSettings(Section, frozen=True):
-    """Settings of a vetting request."""
-
-    space: Space
-    vetting: Vetting
 
 
 class Ablation(Section, frozen=True):
@@ -135,9 +127,18 @@ class ArenaSettings(Section, frozen=True, dict=True, cache_hash=True):
         return light_of(self.environment, self.arena)
 
 
-def vetting_settings(experiment: Experiment) -> bytes:
-    """Return the JSON that every vetting request of an experiment holds."""
-    return msgspec.json.encode(_sections(experiment, VettingSettings))
+def breeding_settings(experiment: Experiment) -> bytes:
+    """Return the JSON that every breeding request of an island holds.
+
+    It is the whole experiment, as an own encoding may read all of it.
+    """
+    return msgspec.json.encode(experiment)
+
+
+def breeding_plugins(experiment: Experiment) -> bytes:
+    """Return JSON that names the plug-ins which a breeding request needs."""
+    sections = experiment.encoding, experiment.brain, experiment.space
+    return msgspec.json.encode(sections)
 
 
 def evaluation_settings_of(
@@ -245,7 +246,7 @@ def split_problems(settings: ArenaSettings) -> Iterator[str]:
         yield "fitness or a measure needs trace.neighbours, a count of other robots"
 
 
-read_vetting_settings = lru_cache(maxsize=64)(partial(_from_json, VettingSettings))
+read_breeding_settings = lru_cache(maxsize=64)(partial(_from_json, Experiment))
 read_evaluation_settings = lru_cache(maxsize=64)(
     partial(_from_json, EvaluationSettings)
 )

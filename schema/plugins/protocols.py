@@ -23,7 +23,7 @@ Made_co = TypeVar("Made_co", covariant=True)
 
 
 class Encoding(Protocol[Genome]):
-    """Encoding of robots in genomes, ``encoding.type``; runs in the coordinator.
+    """Encoding of robots in genomes, ``encoding.type``; runs in analyzers.
 
     The experiment names a class. It is called once for each island, as
     ``Class(experiment, types, parameters)``: the settings of the island, whose
@@ -313,7 +313,7 @@ class BrainRules(Struct, frozen=True):
 
 
 class BrainGenes(Protocol):
-    """Half of a brain type that runs in the coordinator: how genes make brains.
+    """Half of a brain type that runs in analyzers: how genes make brains.
 
     Every method changes ``outputs``, ``hidden`` and ``connections`` of branches in
     place and draws numbers only from ``draws``. Branches are depth first.

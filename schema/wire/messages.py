@@ -17,34 +17,44 @@ from schema.limits import (
     MOST_RUN_NAME,
     MOST_SHARDS,
     MOST_SLOTS,
+    ROBOT_BYTES,
     VALUE_BYTES,
     Finite,
 )
 from schema.parts import Vector
 from schema.robot.ids import BirthId, IslandNumber
-from schema.robot.results import Evaluation, Report, WallTime
+from schema.robot.results import Evaluation, WallTime
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, AdvanceShard
 from schema.wire.codec import Message
 
 Epoch = Annotated[int, Meta(ge=0, le=MOST_EPOCH)]
+GenomeBytes = Annotated[bytes, Meta(max_length=ROBOT_BYTES)]
 Packed = Annotated[bytes, Meta(max_length=VALUE_BYTES)]
 """Plain value, by ``schema.wire.calls.pack_value``."""
 RunName = Annotated[str, Meta(min_length=1, max_length=MOST_RUN_NAME)]
 
 
-class Vet(Message, frozen=True, tag="vet"):
-    """Vet a candidate's body on an analyzer; its brain has no effect.
+class Breed(Message, frozen=True, tag="breed"):
+    """Make a child of a couple, or a random robot, on an analyzer, and vet its body.
+
+    A new attempt follows each one that fails. The random draws of an attempt depend on
+    the origin of the request, the birth and the attempt alone.
 
     Attributes:
-        birth: id of the candidate.
-        attempt: number of the attempt at this birth, from 0.
-        robot: the candidate.
+        birth: id of the child.
+        attempt: number of the first attempt at this birth, from 0.
+        end: number of the attempt at which to stop.
+        parents: genomes of its parents, two or one, the one that gives the root first;
+            none for a random robot.
+        founder: genome of a given founder, which is only developed and vetted.
     """
 
     birth: BirthId
     attempt: Count
-    robot: Robot
+    end: Count
+    parents: Annotated[tuple[GenomeBytes, ...], Meta(max_length=2)] = ()
+    founder: GenomeBytes | None = None
 
 
 class Evaluate(Message, frozen=True, tag="evaluate"):
@@ -79,7 +89,7 @@ class Call(Message, frozen=True, tag="call"):
     argument: Packed
 
 
-Work = Vet | Evaluate | AdvanceShard | Call
+Work = Breed | Evaluate | AdvanceShard | Call
 
 
 class Request(Message, frozen=True):
@@ -102,6 +112,40 @@ class Request(Message, frozen=True):
     settings: bytes
     plugins: str = ""
     origin: Origin = NO_ORIGIN
+
+
+class Newborn(Message, frozen=True):
+    """Child with a viable body.
+
+    Attributes:
+        genome: bytes of its genome, in the encoding of the experiment.
+        robot: that develops from it.
+        connections: of its brain in the genome, unresolved ones included.
+    """
+
+    genome: GenomeBytes
+    robot: Robot
+    connections: Count
+
+
+class Bred(Message, frozen=True, tag="bred"):
+    """Outcome of breeding; a coordinator journals it.
+
+    Attributes:
+        birth, attempt: those of the request.
+        reasons: why each attempt before the child's failed, or all attempts.
+        child: of the attempt after these; None if all failed.
+    """
+
+    birth: BirthId
+    attempt: Count
+    reasons: tuple[str, ...] = ()
+    child: Newborn | None = None
+
+    @property
+    def why(self) -> str:
+        """Why the last attempt failed."""
+        return self.reasons[-1] if self.reasons else ""
 
 
 class Failure(Message, frozen=True, tag="failure"):
@@ -171,7 +215,7 @@ class Traced(Message, frozen=True, tag="traced"):
     trace: PackedTrace | None
 
 
-Result = Report | Evaluation | Traced | Advance | CallValue | Failure | StateMissing
+Result = Bred | Evaluation | Traced | Advance | CallValue | Failure | StateMissing
 
 
 class Answer(Message, frozen=True):

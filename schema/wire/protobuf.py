@@ -99,6 +99,15 @@ def decode_genome(data: bytes) -> Genome:
     return assemble(parts, lambda index: _genes(nodes[index]))
 
 
+def count_nodes(data: bytes) -> int:
+    """Return the number of nodes of a genome.
+
+    Raises:
+        MalformedMessage: not a genome's bytes.
+    """
+    return len(_parsed(data, pb.Genome()).nodes)
+
+
 def _genes(message: pb.Node) -> Genes:
     return (
         tuple(map(_neuron_gene, message.outputs)),

@@ -20,7 +20,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-import analyzer.service
+import tests.analyzers
 from coordinator.dispatch.events import AgentKind, Client, Job
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.evolution.generation import generate
@@ -188,7 +188,7 @@ def live_run(
     """
     bodies: dict[AgentKind, tuple[Body, int]] = {
         "worker": (body, workers),
-        "analyzer": (analyzer.service.process, 1),
+        "analyzer": (tests.analyzers.process, 1),
     }
     with tempfile.TemporaryDirectory() as folder, real_fleet(bodies) as fleet:
         details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))

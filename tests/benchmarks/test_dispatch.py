@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import analyzer.service
+import tests.analyzers
 import worker.serve.service
 from coordinator.dispatch.events import DispatchEvent, Joined, Left, Returned
 from coordinator.dispatch.pool import AHEAD_S
@@ -89,7 +89,7 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
         vetting = Agent("analyzer", "analyzer", network.address)
-        stack.enter_context(ProcessPool(analyzer.service.process, (vetting,), size=1))
+        stack.enter_context(ProcessPool(tests.analyzers.process, (vetting,), size=1))
         evaluation = Agent("worker", "worker", network.address)
         stack.enter_context(
             ProcessPool(worker.serve.service.process, (evaluation,), size=2)

@@ -38,8 +38,9 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.tables.description import KeptFounder
 from schema.wire.arena import AdvanceShard
-from schema.wire.messages import Evaluate, Vet
-from tests.coordinator.arena_world import Verdict, World, distinct_fitness, viable
+from schema.wire.messages import Breed, Evaluate
+from tests.coordinator.arena_world import World, distinct_fitness
+from tests.coordinator.breeding import WhyNot, bred, viable
 from tests.coordinator.reports import PROVENANCE
 
 Fit = Callable[[BirthId, int], float]
@@ -82,7 +83,7 @@ class ArchipelagoRun:
     run: int = 0
     order: Iterator[int] | None = None
     fit: Fit = distinct_on_islands
-    verdict: Verdict = viable
+    verdict: WhyNot = viable
     slow: tuple[int, ...] = ()
     founders: Mapping[str, KeptFounder] | None = None
     islands: dict[int, Island | Arena] = field(default_factory=dict)
@@ -90,7 +91,7 @@ class ArchipelagoRun:
     commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
         default_factory=dict
     )
-    waiting: deque[tuple[int, Vet | Evaluate | Ask | AdvanceShard]] = field(
+    waiting: deque[tuple[int, Breed | Evaluate | Ask | AdvanceShard]] = field(
         default_factory=deque
     )
 
@@ -125,8 +126,8 @@ class ArchipelagoRun:
             self.waiting.rotate(-1)
         number, asked = self.waiting.popleft()
         match asked:
-            case Vet():
-                self.tell(number, self.verdict(asked))
+            case Breed():
+                self.tell(number, bred(self.islands[number], asked, self.verdict))
             case Evaluate():
                 labels = self.experiment.measures.labels
                 measures = drawn_measures(asked.birth, len(labels))
@@ -148,7 +149,7 @@ class ArchipelagoRun:
             for command in self.islands[number].handle(event):
                 self.commands[number].append(command)
                 match command:
-                    case Vet() | Evaluate() | Ask() | AdvanceShard():
+                    case Breed() | Evaluate() | Ask() | AdvanceShard():
                         self.waiting.append((number, command))
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))

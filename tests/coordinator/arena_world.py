@@ -20,16 +20,15 @@ from coordinator.islands.events import (
     Finish,
     Record,
     Started,
-    Vetted,
-    VettingFailed,
 )
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, AdvanceShard, Casualty, Judgement, Touch
-from schema.wire.messages import Vet
+from schema.wire.messages import Breed
 from schema.wire.poses import PoseArrays
-from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
+from tests.coordinator.breeding import WhyNot, bred, viable
+from tests.coordinator.reports import PROVENANCE
 
 DT = 0.005
 POSE_STEPS = 40
@@ -38,7 +37,6 @@ MATURE = 3000
 WINDOW = 2400
 
 Fit = Callable[[BirthId, int], float]
-Verdict = Callable[[Vet], Vetted | VettingFailed]
 
 
 def experiment(births: int = 3000, **arena: Any) -> Experiment:  # noqa: ANN401
@@ -60,23 +58,9 @@ def distinct_fitness(birth: BirthId, step: int) -> float:
     return (birth.number * 0.6180339887498949 + step * 1e-5 + 0.1) % 1.0
 
 
-def viable(vet: Vet) -> Vetted:
-    """Report that a body is viable."""
-    return Vetted(vet.birth, vet.attempt, VIABLE)
-
-
 def no_learner(ask: Ask) -> Asked:
     """Refuse requests to learners."""
     raise AssertionError(ask)
-
-
-def reject_some(vet: Vet) -> Vetted | VettingFailed:
-    """Reject every third attempt, and fail at some."""
-    if (vet.birth.number + vet.attempt) % 3 == 1:
-        return Vetted(vet.birth, vet.attempt, CROWDED)
-    if (vet.birth.number + vet.attempt) % 8 == 7:
-        return VettingFailed(vet.birth, vet.attempt, "analyzer broke thrice")
-    return viable(vet)
 
 
 @dataclass
@@ -155,19 +139,19 @@ class ArenaRun:
 
     arena: Arena
     world: World = field(default_factory=World)
-    verdict: Verdict = viable
+    verdict: WhyNot = viable
     learner: Callable[[Ask], Asked] = no_learner
     order: Iterator[int] | None = None
     events: list[ArenaEvent] = field(default_factory=list)
     commands: list[ArenaCommand] = field(default_factory=list)
-    waiting: deque[Vet | Ask | AdvanceShard] = field(default_factory=deque)
+    waiting: deque[Breed | Ask | AdvanceShard] = field(default_factory=deque)
 
     def tell(self, event: ArenaEvent) -> list[ArenaCommand]:
         found = self.arena.handle(event)
         self.events.append(event)
         self.commands += found
         self.waiting += [
-            one for one in found if isinstance(one, Vet | Ask | AdvanceShard)
+            one for one in found if isinstance(one, Breed | Ask | AdvanceShard)
         ]
         return found
 
@@ -175,8 +159,8 @@ class ArenaRun:
         """Answer one request."""
         self.waiting.rotate(-next(self.order) if self.order else 0)
         asked = self.waiting.popleft()
-        if isinstance(asked, Vet):
-            return self.tell(self.verdict(asked))
+        if isinstance(asked, Breed):
+            return self.tell(bred(self.arena, asked, self.verdict))
         if isinstance(asked, Ask):
             return self.tell(self.learner(asked))
         return self.tell(self.world.advance(asked))

@@ -15,7 +15,7 @@ def check_dispatch(dispatch: Dispatch) -> None:
     jobs, homes = dispatch._jobs, dispatch.homes
     for number, pending in jobs.items():
         assert pending.job.number == number
-        pool = dispatch._pools["analyzer" if pending.job.kind == "vet" else "worker"]
+        pool = dispatch._pools["analyzer" if pending.job.kind == "breed" else "worker"]
         for name in pending.holders:
             agent = pool.agents[name]
             assert (agent.held | agent.advances)[number] is pending
@@ -69,7 +69,7 @@ def check_arena(arena: Arena) -> None:
     elif arena._has_started and not (arena.is_finished or arena._is_held):
         infancy, migration = arena._infancy, arena._migration
         assert (
-            arena._vetting_queue.is_busy
+            arena._breeding_queue.is_busy
             or (infancy and infancy.is_waiting)
             or (migration and migration.epochs.is_waiting)
         )

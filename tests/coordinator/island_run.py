@@ -6,13 +6,14 @@ from typing import Any
 
 from coordinator.islands.events import Answered, Ask, IslandCommand, Record, Started
 from coordinator.islands.island import Island
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Breed, Evaluate
+from tests.coordinator.breeding import WhyNot, bred, viable
 
 Answer = Callable[[Any], Answered]
 
 
 def requests(commands: Sequence[IslandCommand]) -> list[Any]:
-    return [one for one in commands if isinstance(one, Vet | Evaluate | Ask)]
+    return [one for one in commands if isinstance(one, Breed | Evaluate | Ask)]
 
 
 def records(commands: Sequence[IslandCommand]) -> list[Record]:
@@ -24,9 +25,14 @@ def rows(commands: Sequence[IslandCommand], table: str) -> list[Any]:
 
 
 def live(
-    island: Island, answer: Answer, order: Iterator[int] | None = None
+    island: Island,
+    answer: Answer,
+    order: Iterator[int] | None = None,
+    why_not: WhyNot = viable,
 ) -> list[IslandCommand]:
     """Run an island to its end, with requests answered in some order.
+
+    Robots are bred here; ``answer`` gives the other answers.
 
     It must not be finished while requests are open, and ignore second answers.
     """
@@ -35,7 +41,9 @@ def live(
     while waiting:
         assert not island.is_finished
         waiting.rotate(-next(order) if order else 0)
-        answers.append(answer(waiting.popleft()))
+        asked = waiting.popleft()
+        is_birth = isinstance(asked, Breed)
+        answers.append(bred(island, asked, why_not) if is_birth else answer(asked))
         following = island.handle(answers[-1])
         assert island.handle(answers[-1]) == []
         commands += following

@@ -15,10 +15,12 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import Answered, Audited
+from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.requests import Requests
 from coordinator.run.run_context import RunContext
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Origin
+from schema.experiment.settings import breeding_settings
 from schema.limits import REQUEST_BYTES
 from schema.parts import BUILT_IN
 from schema.robot.brain import Brain, Connection, Neuron
@@ -46,6 +48,8 @@ ROBOT = Robot(
         (Connection(0, 6, 0.75),),
     ),
 )
+EXPERIMENT = Experiment(name="requests")
+SETTINGS = breeding_settings(EXPERIMENT)
 JUDGED = Evaluation(0.25, 0.06, 0.05, 12.0)
 
 
@@ -101,21 +105,22 @@ class SentJobs:
 class SentRequests(SentJobs):
     """Requests whose jobs are recorded, with two workers and two analyzers."""
 
-    def __init__(self, evaluation: bytes = b'"evaluation"', audit: float = 0.0) -> None:
+    def __init__(
+        self, evaluation: bytes = b'"evaluation"', checks: Checks = NO_CHECKS
+    ) -> None:
         super().__init__()
         self.fleet = JobRouter(self)
         self.now_s = 0.0
-        experiment = Experiment(name="requests")
         context = RunContext(
             CLIENT,
             ORIGIN,
-            b'"vetting"',
+            {0: (SETTINGS, evaluation)},
             {0: evaluation, 2: evaluation},
             {},
-            {0: experiment, 2: experiment},
+            {0: EXPERIMENT, 2: EXPERIMENT},
             BUILT_IN,
         )
-        self.requests = Requests(context, self.fleet, audit)
+        self.requests = Requests(context, self.fleet, checks)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
         for name in ("judge", "juror"):

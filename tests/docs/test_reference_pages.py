@@ -19,7 +19,6 @@ from schema.experiment.settings import (
     Ablation,
     ArenaSettings,
     EvaluationSettings,
-    VettingSettings,
 )
 from schema.tables.columns import TABLES
 
@@ -47,7 +46,7 @@ _INNER = ("Origin", "Range")
 def _sections(base: type[Section] = Section) -> Iterator[type[Section]]:
     """Yield the sections that users write; the others are parts of requests."""
     others = (
-        PluginSection, ArenaWorld, VettingSettings, EvaluationSettings, ArenaSettings,
+        PluginSection, ArenaWorld, EvaluationSettings, ArenaSettings,
         Ablation,
     )  # fmt: skip
     for found in base.__subclasses__():

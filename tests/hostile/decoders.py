@@ -12,14 +12,15 @@ from typing import Any
 
 from msgspec.structs import replace
 
-import analyzer.report
+import tests.analyzers
 from analysis.viewer.received import received_poses
 from analysis.viewer.scene import Scene, scene_of
 from coordinator.dispatch.faults import PeerFaults
+from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import JournalledEvent
 from coordinator.network.membership import Membership
 from coordinator.run.advance_checks import ExpectedAdvance, check_advance, check_poses
-from coordinator.run.requests import read_answer, read_evaluation, read_vetting
+from coordinator.run.requests import read_answer, read_bred, read_evaluation
 from coordinator.storage.journal import decode_record, encode_event
 from revolve.fleet import _read_value
 from schema.agent.network import Agent
@@ -41,12 +42,12 @@ from schema.experiment.file import (
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
+    breeding_settings,
     evaluation_settings,
     lasting,
     read_arena_settings,
+    read_breeding_settings,
     read_evaluation_settings,
-    read_vetting_settings,
-    vetting_settings,
 )
 from schema.formats.files import robot_from_yaml
 from schema.formats.robogen_json import robot_from_robogen_json
@@ -79,6 +80,7 @@ from schema.wire.genome_bytes import encode_genome
 from schema.wire.messages import (
     AgentInfo,
     Answer,
+    Breed,
     Call,
     CallValue,
     Crash,
@@ -88,7 +90,6 @@ from schema.wire.messages import (
     Result,
     RunningJob,
     StateMissing,
-    Vet,
     Work,
 )
 from schema.wire.operator import (
@@ -114,9 +115,8 @@ from schema.wire.updates import (
     decode_page,
     pages_of,
 )
-from tests.coordinator.reports import VIABLE
 from tests.coordinator.run.test_honest_worlds import advances, settings_of
-from tests.coordinator.sent_requests import BIRTH, JUDGED, ROBOT
+from tests.coordinator.sent_requests import BIRTH, EXPERIMENT, JUDGED, ROBOT
 from tests.coordinator.storage.test_journal import EVENTS
 from tests.documents import parse_experiment
 from worker.arena.world import World
@@ -169,14 +169,14 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     kept = (200, bytes(32), rebuild)
     advance = _request(AdvanceShard(0, 1, 400, changes, True, False, *kept), settings)
     evaluation = _request(Evaluate(BIRTH, ROBOT, 1, 400, 0), evaluation_settings(rules))
-    vetting = _request(Vet(BIRTH, 0, ROBOT), vetting_settings(rules))
+    breeding = _request(Breed(BIRTH, 0, 5), breeding_settings(rules))
     argument = Call(pack_value({"a": [1, 2.5, None, "é"]}))
     call = _request(argument, call_settings("lab:score"))
-    requests = (advance, evaluation, vetting, call)
+    requests = (advance, evaluation, breeding, call)
     yield _of(Request, ADVANCE_REQUEST_BYTES, *requests)
     for compute, samples in (
-        (analyzer.report.answer, (vetting,)),
-        (_read_job, (evaluation, vetting, call)),
+        (tests.analyzers.answer, (breeding,)),
+        (_read_job, (evaluation, breeding, call)),
     ):
         reply = Server(compute, _agent()).reply
         # It refuses only what is no valid sample for it.
@@ -186,7 +186,7 @@ def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     yield Target("Server.cancel", Server(_read_job, _agent()).cancel, prints, ())
     yield Target("unpack_value", unpack_value, (argument.argument,))
     for name, read, sample in (
-        ("vetting", read_vetting_settings, vetting_settings(rules)),
+        ("breeding", read_breeding_settings, breeding_settings(rules)),
         ("evaluation", read_evaluation_settings, evaluation_settings(rules)),
         ("arena", read_arena_settings, settings),
     ):
@@ -238,10 +238,12 @@ def _answers(made: list[tuple[Advance, ExpectedAdvance]]) -> Iterator[Target]:
         return encode(Answer(*JOB, 0.5, result))
 
     failed, value = answer(Failure("diverged")), answer(CallValue(pack_value([1])))
-    evaluated, vetted = answer(JUDGED), answer(VIABLE)
-    yield _of(Answer, ADVANCE_BYTES, evaluated, vetted, failed, value)
-    vetting = partial(read_vetting, expected=JOB)
-    yield Target("read_vetting", vetting, (vetted, failed))
+    breeding = Request("run", *JOB, Breed(BIRTH, 0, 5), breeding_settings(EXPERIMENT))
+    evaluated, bred = answer(JUDGED), answer(tests.analyzers.answer(breeding))
+    yield _of(Answer, ADVANCE_BYTES, evaluated, bred, failed, value)
+    encoding = encoding_of(EXPERIMENT)
+    breeding_of = partial(read_bred, request=breeding, encoding=encoding)
+    yield Target("read_bred", breeding_of, (bred,))
     evaluation = partial(read_evaluation, expected=JOB)
     yield Target("read_evaluation", evaluation, (evaluated, failed))
     yield Target("_read_value", partial(_read_value, expected=JOB), (value, failed))

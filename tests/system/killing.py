@@ -10,11 +10,12 @@ run, and one of JSON at the end: kills by kind, kills per run, and the differenc
 after some CPU time. Before a kill in the recovery of poses the segment is cut, as a
 power loss does.
 
-``fleet``: coordinators at a hub, with an analyzer and three worker processes that their
-pool restarts; arenas are divided over these. All kills are at sizes of the journal or
-times after the last kill. Some coordinators are killed together with all workers, and
-some find cut poses when they resume. Some workers are stopped instead: they keep their
-connection and are silent until the next kill of a worker, which is theirs.
+``fleet``: coordinators at a hub, with two analyzer and three worker processes that
+their pools restart; arenas are divided over the workers. Kills of workers hit
+analyzers, too. All kills are at sizes of the journal or times after the last kill. Some
+coordinators are killed together with all agents, and some find cut poses when they
+resume. Some agents are stopped instead: they keep their connection and are silent until
+the next kill of an agent, which is theirs.
 """
 
 from tests.system import warm  # first: it prepares the process before NumPy's import
@@ -162,8 +163,10 @@ class FleetKills:
         self._start("hub", "--listen", self._address)
         warm.wait_for("listening on ", self._log)
         flags = ("--connect", self._address, "--processes")
-        self._start("analyzer", *flags, "1")
-        self._workers = self._start("worker", *flags, str(PROCESSES))
+        self._pools = (
+            self._start("analyzer", *flags, "2"),
+            self._start("worker", *flags, str(PROCESSES)),
+        )
 
     def _start(self, *words: str) -> int:
         child = warm.start(list(words), self._log)
@@ -187,7 +190,7 @@ class FleetKills:
                     break
                 assert code == -signal.SIGKILL, warm.tail(log_of(folder))
                 if self._rng.random() < TOGETHER:
-                    for agent in warm.agents(self._workers):
+                    for agent in self._agents:
                         self._signal(agent, signal.SIGKILL)
                 if self._rng.random() < 0.2:
                     cut_poses(folder, self._rng.uniform(0.2, 0.9))
@@ -206,14 +209,18 @@ class FleetKills:
             words += ["--arena-workers", str(PROCESSES)]
         return warm.start([*words, "--connect", self._address], log_of(folder))
 
+    @property
+    def _agents(self) -> list[int]:
+        return [agent for pool in self._pools for agent in warm.agents(pool)]
+
     def _draw(self, left: Counter[str]) -> str:
         """Return the role of the next process to kill."""
         share = left["coordinator"] / left.total()
         return "coordinator" if self._rng.random() < share else "worker"
 
     def _kill_worker(self) -> bool:
-        """Kill or stop a worker process; return whether there was one."""
-        agents = warm.agents(self._workers)
+        """Kill or stop a worker or an analyzer; return whether there was one."""
+        agents = self._agents
         if not agents:
             return False
         agent, how = agents[self._rng.integers(len(agents))], signal.SIGKILL

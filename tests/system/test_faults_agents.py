@@ -56,6 +56,8 @@ def test_stopping_and_continuing_the_holder_of_an_arena_gives_an_equal_run(
     stopped = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
+    # Most of the journal are the founders, which are bred before.
+    wait_until(lambda: "one" in holders(fleet.folder), "the arena is advanced")
     stop_continue_and_finish(fleet, stopped, small_arena_run, seed=22)
     assert set(holders(fleet.folder)) == {"one", "two"}
 

@@ -49,7 +49,7 @@ class Jobs:
                 return call_function(request.work, request.settings)
             case Evaluate():
                 return answer_evaluation(request, request.work)
-        raise MalformedMessage("a worker vets no bodies")
+        raise MalformedMessage("a worker breeds no robots")
 
 
 def answer_evaluation(

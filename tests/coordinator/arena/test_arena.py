@@ -11,8 +11,6 @@ from coordinator.islands.events import (
     ArenaEvent,
     Finish,
     Started,
-    Vetted,
-    VettingFailed,
 )
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment
@@ -20,7 +18,7 @@ from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.tables.columns import ROWS
 from schema.wire.arena import Advance
-from schema.wire.messages import Vet
+from schema.wire.messages import Bred, Breed
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,
@@ -28,9 +26,9 @@ from tests.coordinator.arena_world import (
     distinct_fitness,
     equal_fitness,
     experiment,
-    reject_some,
 )
-from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
+from tests.coordinator.breeding import reject_some
+from tests.coordinator.reports import PROVENANCE
 
 
 def life(births: int = 3000, *, world: World | None = None) -> ArenaRun:
@@ -43,7 +41,7 @@ def numbers(rows: list[dict[str, int]]) -> list[int]:
 
 def test_founders_are_inserted_each_second_the_last_made_first() -> None:
     lived = life().live(14.9)
-    vets = [one for one in lived.commands if isinstance(one, Vet)]
+    vets = [one for one in lived.commands if isinstance(one, Breed)]
     assert [one.birth.number for one in vets] == list(range(15))
     advances = lived.advances
     inserted = [one.changes.insertions for one in advances]
@@ -133,20 +131,16 @@ def test_only_the_mature_have_children() -> None:
 
 
 def test_a_couple_has_five_attempts_and_then_loses_its_birth() -> None:
-    def stubborn(vet: Vet) -> Vetted:
-        is_child = vet.birth.number >= 15
-        refused = is_child and vet.attempt < 7
-        return Vetted(vet.birth, vet.attempt, CROWDED if refused else VIABLE)
+    def stubborn(birth: BirthId, attempt: int) -> str:
+        return "crowded" if birth.number >= 15 and attempt < 7 else ""
 
     lived = ArenaRun(Arena(experiment(), 1, 0), verdict=stubborn).live(46)
-    vets = [one for one in lived.commands if isinstance(one, Vet)][15:]
-    assert [one.birth.number for one in vets] == [15] * len(vets)
-    attempts = [one.attempt for one in vets]
-    assert attempts == sorted(set(attempts))
+    works = [one for one in lived.commands if isinstance(one, Breed)][15:]
+    ranges = [(one.birth.number, one.attempt, one.end) for one in works]
+    assert ranges == [(15, 0, 5), (15, 5, 10)]
     (born,) = lived.rows("births")[15:]
     assert (born["birth"], born["sim_time_s"]) == (15, 45.0)
-    assert born["attempts"] == attempts[-1] + 1 >= 8
-    assert [one.attempt for one in vets if one.attempt < 5]
+    assert 8 <= born["attempts"] <= 10
 
 
 def test_an_arena_ends_at_the_birth_interval_after_the_last_birth() -> None:
@@ -247,13 +241,13 @@ def test_a_wrong_advance_raises_and_changes_nothing(change: dict[str, Any]) -> N
 def test_answers_that_were_never_requested_raise() -> None:
     lived = life()
     with pytest.raises(UnexpectedEvent, match="has not started"):
-        lived.arena.handle(Vetted(BirthId(0, 0), 0, VIABLE))
+        lived.arena.handle(Bred(BirthId(0, 0), 0))
     lived.tell(Started())
     unexpected: tuple[ArenaEvent, ...] = (
         Started(),
-        Vetted(BirthId(0, 15), 0, VIABLE),
-        Vetted(BirthId(1, 3), 0, VIABLE),
-        VettingFailed(BirthId(0, 2**40), 0, "x"),
+        Bred(BirthId(0, 15), 0),
+        Bred(BirthId(1, 3), 0),
+        Bred(BirthId(0, 2**40), 0, ("x",)),
         Advanced(0, 0, Advance(200, bytes(32), (), (), ()), 0, PROVENANCE),
     )
     for event in unexpected:

@@ -27,8 +27,8 @@ from tests.coordinator.arena_world import (
     distinct_fitness,
     equal_fitness,
     experiment,
-    reject_some,
 )
+from tests.coordinator.breeding import reject_some
 
 
 def life() -> ArenaRun:
@@ -42,7 +42,7 @@ def order(lived: ArenaRun, wanted: Order, name: str = "") -> list[ArenaCommand]:
 
 
 def genome(lived: ArenaRun) -> bytes:
-    return lived.arena.encoding.to_bytes(lived.arena.population[0].genome)
+    return lived.arena.population[0].genome
 
 
 def test_an_order_takes_effect_at_the_next_decision() -> None:

@@ -29,7 +29,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
 from schema.wire.arena import AdvanceShard, BrainChange
-from schema.wire.messages import Vet
+from schema.wire.messages import Breed
 from schema.wire.protobuf import decode_robot
 from tests.coordinator.arena_world import (
     DT,
@@ -39,8 +39,8 @@ from tests.coordinator.arena_world import (
     distinct_fitness,
     equal_fitness,
     experiment,
-    reject_some,
 )
+from tests.coordinator.breeding import reject_some
 
 FIRST = BirthId(0, 14)
 """Founder that is inserted first, at step 0."""
@@ -146,9 +146,9 @@ def test_infants_neither_mate_nor_die_by_selection() -> None:
     run.live(59.9)
     assert len(run.rows("births")) == 15
     assert run.rows("deaths") == []
-    vets = sum(isinstance(one, Vet) for one in run.commands)
+    vets = sum(isinstance(one, Breed) for one in run.commands)
     run.live(60.1)
-    assert sum(isinstance(one, Vet) for one in run.commands) == vets + 1
+    assert sum(isinstance(one, Breed) for one in run.commands) == vets + 1
     # Ten founders are mature, 14 to 5, whose mean is 9.5: 5 and 6 are below 6.65.
     assert [row["birth"] for row in run.rows("deaths")] == [5, 6]
 
@@ -204,7 +204,7 @@ def test_orders_end_an_infancy() -> None:
     assert run.arena.step == 4200
     assert len(trials(run, other)) == 0  # the brain does not fit the body
     living = next(one for one in run.arena.population if one.birth == other)
-    brain = run.arena.encoding.develop(living.genome).brain
+    brain = run.arena.encoding.robot_of(living.genome).brain
     order(run, ReplaceBrain(other, brain))
     ((_, last),) = exchanged(run, other)[-1:]
     assert (last.brain, last.restarts_window) == (brain, True)
@@ -223,10 +223,9 @@ def test_what_is_learnt_is_inherited_or_kept(inherit: str) -> None:
     grown = next(one for one in run.arena.population if one.birth == FIRST)
     rows = [row for row in run.rows("learning") if row["birth"] == FIRST.number]
     adult = decode_robot(rows[-1]["robot"])
-    genome = run.arena.encoding.to_bytes(grown.genome)
-    developed: Robot = run.arena.encoding.develop(grown.genome)
+    developed: Robot = run.arena.encoding.robot_of(grown.genome)
     if inherit == "darwinian":
-        assert genome == births[FIRST.number]["genome"]
+        assert grown.genome == births[FIRST.number]["genome"]
         assert grown.learnt == adult
         assert developed.brain != adult.brain
     else:

@@ -14,7 +14,8 @@ from coordinator.evolution.random_streams import BufferedRng
 from coordinator.islands.events import Record, Started
 from schema.experiment.document import ArenaSection
 from schema.robot.ids import BirthId
-from tests.coordinator.arena_world import DT, ArenaRun, World, experiment, reject_some
+from tests.coordinator.arena_world import DT, ArenaRun, World, experiment
+from tests.coordinator.breeding import reject_some
 
 
 def draws(seed: int) -> BufferedRng:

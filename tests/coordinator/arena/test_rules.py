@@ -10,7 +10,6 @@ from coordinator.arena.arena import Arena
 from coordinator.arena.check_rules import check_rules
 from coordinator.arena.rules import BUILT_IN, CheckedRules, load_rules
 from coordinator.arena.thesis_rules import ThesisRules
-from coordinator.islands.events import VettingFailed
 from schema.errors import ExperimentError, one_line
 from schema.plugins.arena_rules import (
     ArenaView,
@@ -19,15 +18,11 @@ from schema.plugins.arena_rules import (
     Decisions,
     Patch,
 )
-from schema.wire.messages import Vet
+from schema.robot.ids import BirthId
+from schema.wire.messages import Breed
 from tests.coordinator.arena_views import born, resident, view
-from tests.coordinator.arena_world import (
-    ArenaRun,
-    Verdict,
-    World,
-    experiment,
-    viable,
-)
+from tests.coordinator.arena_world import ArenaRun, World, experiment
+from tests.coordinator.breeding import WhyNot, viable
 
 A, B, GONE = born(0, 1, 7)
 NAN = float("nan")
@@ -192,7 +187,7 @@ def twins_at(second: float, *parents: tuple[int, ...]) -> Any:  # noqa: ANN401
 
 
 def lived(
-    verdict: Verdict = viable,
+    verdict: WhyNot = viable,
     births: int = 40,
     world: World | None = None,
     parents: str = "tournament",
@@ -210,13 +205,13 @@ def outcomes(run: ArenaRun) -> list[tuple[list[int], int | None, str]]:
     ]
 
 
-def test_children_of_one_decision_are_vetted_one_after_the_other(
+def test_children_of_one_decision_are_bred_one_after_the_other(
     scripted: type[Scripted],
 ) -> None:
     scripted.answer = twins_at(30.0, (0, 1), (2,))
     run = lived()
     assert outcomes(run) == [([0, 1], 15, "born"), ([2], 16, "born")]
-    vets = [one.birth.number for one in run.commands if isinstance(one, Vet)]
+    vets = [one.birth.number for one in run.commands if isinstance(one, Breed)]
     assert vets == list(range(17))
     rows = run.rows("births")[-2:]
     assert [row["sim_time_s"] for row in rows] == [30.0, 30.0]
@@ -231,10 +226,8 @@ def test_child_that_no_body_is_viable_for_leaves_no_gap(
     scripted.answer = twins_at(30.0, (0, 1), (2, 3), (4,))
     attempts = experiment().selection.max_mating_attempts
 
-    def refuse_first(vet: Vet) -> Any:  # noqa: ANN401
-        if vet.birth.number == 15 and vet.attempt < attempts:
-            return VettingFailed(vet.birth, vet.attempt, "no")
-        return viable(vet)
+    def refuse_first(birth: BirthId, attempt: int) -> str:
+        return "no" if birth.number == 15 and attempt < attempts else ""
 
     assert outcomes(lived(refuse_first)) == [
         ([0, 1], None, "not viable"),

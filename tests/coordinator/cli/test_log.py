@@ -17,24 +17,17 @@ from coordinator.islands.events import (
     Insert,
     JournalledEvent,
     Remove,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.storage.journal import NAME, Journal
 from revolve.command import main as revolve
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation, Provenance
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.messages import Bred, Newborn
+from tests.coordinator.sent_requests import ROBOT
 
 ZERO = (0.0, 0.0, 0.0)
-VIABLE = Report(
-    is_viable=True, reason="", intersections=(), lower=ZERO, upper=ZERO, mass=0.5,
-    motors=3,
-)  # fmt: skip
-REFUSED = Report(
-    is_viable=False, reason="parts 1 and 3 intersect", intersections=((1, 3),),
-    lower=ZERO, upper=ZERO, mass=0.25, motors=1,
-)  # fmt: skip
+CHILD = Newborn(b"", ROBOT, 0)
 GOOD = Evaluation(0.125, 0.5, 0.25, 30.0)
 WORKER = Provenance("hal", "linux", 0.05)
 OTHER = Provenance("eve", "linux", 0.06)
@@ -47,9 +40,9 @@ ADVANCE = Advance(
 )
 FAILED = EvaluationFailed(BirthId(0, 1), "diverged\nat 3.2 s", WORKER, 2, 1)
 EVENTS: list[JournalledEvent] = [
-    Vetted(BirthId(0, 0), 0, REFUSED),
-    Vetted(BirthId(0, 0), 1, VIABLE),
-    VettingFailed(BirthId(1, 7), 4, "KeyError: 'Wheel'"),
+    Bred(BirthId(0, 0), 0, (), CHILD),
+    Bred(BirthId(0, 0), 5, ("parts 1 and 3 intersect", "no motor"), CHILD),
+    Bred(BirthId(1, 7), 0, ("a", "b", "c", "d", "e")),
     Evaluated(BirthId(0, 0), GOOD, WORKER),
     FAILED,
     Advanced(0, 17, ADVANCE, 120, WORKER),
@@ -58,12 +51,15 @@ EVENTS: list[JournalledEvent] = [
     Audited(FAILED, Evaluated(BirthId(0, 1), GOOD, OTHER, 2, 1)),
 ]
 LINES = [
+    "     0  bred                    0  0:0         0  viable, parts 2",
     (
-        "     0  vetted                  0  0:0         0  "
-        "not viable, parts 1 and 3 intersect, motors 1, 0.250 kg"
+        "     1  bred                    0  0:0         7  "
+        "viable, parts 2, failed: parts 1 and 3 intersect and no motor"
     ),
-    "     1  vetted                  0  0:0         1  viable, motors 3, 0.500 kg",
-    "     2  vetting-failed          1  1:7         4  KeyError: 'Wheel'",
+    (
+        "     2  bred                    1  1:7         4  "
+        "no child, failed: a and b and c and d and e"
+    ),
     (
         "     3  evaluated               0  0:0         0  "
         "fitness 0.1250, 30.0 s simulated, worker hal, in 0.050 s"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.assignment import CALL_S, COPY_GROWTH, LEAST_S, VETS_AT_HAND
+from coordinator.dispatch.assignment import BIRTHS_AT_HAND, CALL_S, COPY_GROWTH, LEAST_S
 from coordinator.dispatch.dispatch import MAX_DEATHS, MAX_ERRORS, Dispatch
 from coordinator.dispatch.events import (
     AgentKind,
@@ -328,7 +328,7 @@ def test_repeated_events_change_nothing() -> None:
     "event",
     [
         Requested(job(4)),
-        Requested(job(5, "vet")),
+        Requested(job(5, "breed")),
         worker("b", slots=0),
         worker("a", slots=3),
         Joined("a", "analyzer", 1, "p"),
@@ -439,7 +439,7 @@ def simulation(number: int, simulated_s: float = 12.0, paired: int = -1) -> Job:
 
 
 def vetting(number: int) -> Job:
-    return replace(job(number, "vet"), simulated_s=0.0)
+    return replace(job(number, "breed"), simulated_s=0.0)
 
 
 class Silence:
@@ -455,7 +455,7 @@ class Silence:
         self.delivered_s: dict[int, float] = {}
         self.told: list[Overdue] = []
         self.silent = [f"silent-{number}" for number in range(silent)]
-        kind: AgentKind = "analyzer" if make(0).kind == "vet" else "worker"
+        kind: AgentKind = "analyzer" if make(0).kind == "breed" else "worker"
         self.handle(Ticked(0.0))
         for name in (*self.silent, "the honest"):
             self.handle(Joined(name, kind, 1, "p"))
@@ -513,7 +513,7 @@ def test_each_silent_agent_costs_a_small_delay(
         found = world.dispatch.silent()
         assert set(found) == set(world.silent)
         # They get no more than what an agent holds at first.
-        at_hand = 1 + (VETS_AT_HAND if make is vetting else 1)
+        at_hand = 1 + (BIRTHS_AT_HAND if make is vetting else 1)
         assert all(1 <= jobs <= at_hand for jobs in found.values())
         assert world.run(100, tick_s) < 0.3
 
@@ -734,10 +734,10 @@ class World:
             )
             assert working < 2 or self.now_s > COPY_GROWTH * LEAST_S
             assert number not in self.held[agent]
-            kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
+            kind: AgentKind = "analyzer" if command.job.kind == "breed" else "worker"
             assert self.agents[agent].kind == kind
             self.held[agent].append(number)
-            at_hand = VETS_AT_HAND if kind == "analyzer" else 1
+            at_hand = BIRTHS_AT_HAND if kind == "analyzer" else 1
             most = self.agents[agent].slots + at_hand + MOST_AHEAD
             assert len(self.held[agent]) <= most
         self.past.append(event)
@@ -774,7 +774,7 @@ class World:
 
     def request(self) -> None:
         number = next(self.numbers)
-        kind: JobKind = self.random.choice(("vet", "evaluate"))
+        kind: JobKind = self.random.choice(("breed", "evaluate"))
         made = replace(job(number, kind), simulated_s=self.random.choice((None, 1.0)))
         self.jobs[number] = made
         self.tell(Requested(self.jobs[number]))

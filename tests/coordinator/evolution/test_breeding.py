@@ -9,7 +9,6 @@ from msgspec.structs import replace
 from coordinator.evolution.breeding import Breeder, Individual
 from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, SelectionSection, Space
-from schema.robot.genome import NeuronGene, Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 
@@ -24,7 +23,7 @@ def breeder(space: Space | None = None, **selection: Any) -> Breeder:  # noqa: A
     return Breeder(experiment, 1, 0)
 
 
-def individuals(genomes: Sequence[object]) -> list[Individual]:
+def individuals(genomes: Sequence[bytes]) -> list[Individual]:
     return [
         Individual(BirthId(0, number), genome, number / 10, rank=1, generation=0)
         for number, genome in enumerate(genomes)
@@ -32,41 +31,25 @@ def individuals(genomes: Sequence[object]) -> list[Individual]:
 
 
 def founders(count: int = 10) -> list[Individual]:
-    genomes = [breeder().conceive(BirthId(0, n), 0, (), None)[1] for n in range(count)]
-    return individuals([genome for genome in genomes if genome])
+    return individuals([b"%d" % number for number in range(count)])
 
 
-def test_founders_have_no_parents_and_each_attempt_gives_another_robot() -> None:
-    attempts = [breeder().conceive(CHILD, attempt, (), None) for attempt in range(9)]
-    assert all(couple is None and genome for couple, genome in attempts)
-    assert len({genome for _, genome in attempts}) == 9
-    assert attempts == [breeder().conceive(CHILD, k, (), None) for k in range(9)]
+def test_founders_have_no_parents_and_all_their_attempts_in_order() -> None:
+    requests = [breeder().request(CHILD, attempt, ()) for attempt in (0, 3, 5, 98)]
+    ranges = [(work.attempt, work.end) for work, _ in requests]
+    assert ranges == [(0, 5), (3, 5), (5, 10), (98, 100)]
+    assert all((work.parents, couple) == ((), None) for work, couple in requests)
 
 
 def test_a_couple_is_replaced_after_max_mating_attempts() -> None:
-    population = founders()
-    couple = None
-    seen = []
-    for attempt in range(15):
-        couple, _ = breeder(parents="random").conceive(
-            CHILD, attempt, population, couple
-        )
+    population, seen = founders(), set[tuple[bytes, ...]]()
+    for attempt in (0, 5, 10):
+        work, couple = breeder(parents="random").request(CHILD, attempt, population)
         assert couple is not None
-        seen.append((couple[0].birth.number, couple[1].birth.number))
-    blocks = [set(seen[start : start + 5]) for start in (0, 5, 10)]
-    assert all(len(block) == 1 for block in blocks)
-    assert len(set.union(*blocks)) == 3
-
-
-def test_parents_that_cannot_mate_give_no_genome() -> None:
-    motor = Node("ActiveHinge", 0, 0, GREY, outputs=(NeuronGene("Simple", (0.0, 0.5)),))
-    pair = Node("Core", -1, 0, GREY, children=((0, motor),))
-    # Two parts each: every child has two as well, one too few.
-    couple, genome = breeder(Space(min_parts=3)).conceive(
-        CHILD, 0, individuals([pair] * 5), None
-    )
-    assert couple is not None
-    assert genome is None
+        assert (work.attempt, work.end) == (attempt, attempt + 5)
+        assert work.parents == tuple(one.genome for one in couple)
+        seen.add(work.parents)
+    assert len(seen) == 3
 
 
 @pytest.mark.parametrize(
@@ -82,9 +65,9 @@ def test_too_many_failed_attempts_raise_an_error(
 ) -> None:
     population = [] if is_founder else founders(5)
     patient = breeder(parents=parents)
-    patient.check_attempts(limit - 1, population, "too crowded")
+    patient.request(CHILD, limit - 1, population, "too crowded")
     with pytest.raises(ExperimentError) as caught:
-        patient.check_attempts(limit, population, "too crowded")
+        patient.request(CHILD, limit, population, "too crowded")
     message = str(caught.value)
     assert "\n" not in message
     for word in (f"{what} = {limit}", "too crowded"):
@@ -103,7 +86,7 @@ def test_with_culling_weak_robots_are_removed_at_the_interval() -> None:
 
 @pytest.mark.parametrize("found", [Evaluation(0.1, 0.1, 0.1, 12.0, (2.0,)), None])
 def test_a_selection_function_cannot_change_measures(found: Evaluation | None) -> None:
-    (founder,) = individuals([None])
+    (founder,) = individuals([b""])
     one: Any = founder.evaluated(found, ["height"])
     assert one.measures == ({} if found is None else {"height": 2.0})
     with pytest.raises(TypeError, match="item assignment"):

@@ -35,8 +35,8 @@ EXPERIMENT = Experiment("test", measures=Measures(names=("a", "b")), grid=GRID)
 RNG = np.random.default_rng(0)
 
 
-def chain(genome: int) -> Robot:
-    bricks = (Part("FixedBrick", at, 1, 0, 0, ()) for at in range(genome - 1))
+def chain(genome: bytes) -> Robot:
+    bricks = (Part("FixedBrick", at, 1, 0, 0, ()) for at in range(len(genome) - 1))
     return Robot((Part("Core", -1, -1, -1, 0, ()), *bricks))
 
 
@@ -51,7 +51,7 @@ def members(
     for number, (fitness, *values) in enumerate(rows, start=first):
         made = Individual(
             BirthId(0, number),
-            genomes.get(number, 1),
+            b"." * genomes.get(number, 1),
             fitness,
             rank=1,
             generation=0,

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import encoding_of, outside_limits
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
@@ -18,6 +17,7 @@ from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_robot
 from schema.wire.protobuf import decode_robot
+from tests.coordinator.breeding import candidate
 
 Own = Callable[..., Experiment]
 THESIS = Experiment(name="test")
@@ -89,8 +89,7 @@ def test_an_own_encoding_gets_its_parameters(own_encoding: Own) -> None:
 
 def test_births_of_an_own_encoding_hold_the_robot(own_encoding: Own) -> None:
     experiment = own_encoding()
-    born = Breeder(experiment, 7, 0).candidate(BIRTH, 0, ())
-    assert born is not None
+    born = candidate(experiment, BIRTH)
     row = birth_record(born, born.individual(0), encoding_of(experiment)).row
     assert decode_robot(row["robot"]) == born.robot
 
@@ -186,10 +185,10 @@ def test_limits_of_a_robot(robot: Robot, space: Space, problem: str) -> None:
 
 def test_a_robot_outside_the_limits_is_a_failed_attempt(own_encoding: Own) -> None:
     experiment = own_encoding(("self.most = min(", "self.most = max("))
-    breeder = Breeder(replace(experiment, space=Space(max_parts=4)), 7, 0)
-    found = [breeder.candidate(BirthId(0, number), 0, ()) for number in range(8)]
-    assert all(one is not None and len(one.robot.parts) <= 4 for one in found)
-    assert any(one is not None and one.attempt > 0 for one in found)
+    experiment = replace(experiment, space=Space(max_parts=4))
+    found = [candidate(experiment, BirthId(0, number)) for number in range(8)]
+    assert all(len(one.robot.parts) <= 4 for one in found)
+    assert any(one.attempt > 0 for one in found)
 
 
 def test_an_encoding_that_never_keeps_the_limits_stops_the_run(
@@ -202,4 +201,4 @@ def test_an_encoding_that_never_keeps_the_limits_stops_the_run(
     broken = own_encoding(("count = int(", "count = 1 + 0 * int("))
     experiment = replace(experiment, encoding=broken.encoding)
     with pytest.raises(ExperimentError, match=r"the robot has 2 parts, outside space"):
-        Breeder(experiment, 7, 0).candidate(BirthId(0, 0), 0, ())
+        candidate(experiment, BirthId(0, 0))

@@ -5,15 +5,14 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from coordinator.evolution.breeding import Breeder, Candidate, Individual
-from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.breeding import Breeder, Individual
 from coordinator.islands.events import Ask
-from coordinator.islands.rows import birth_record
 from coordinator.run.learners import Learners
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
+from tests.coordinator.breeding import candidate
 from tests.documents import parse
 
 LAB = """
@@ -43,33 +42,23 @@ class Asking:
 BIRTH = BirthId(3, 200)
 
 
-def living(breeder: Breeder) -> list[Individual]:
-    found = []
-    for number in range(6):
-        born = breeder.candidate(BirthId(3, number), 0, ())
-        assert born is not None
-        found.append(replace(born.individual(0), fitness=float(number)))
-    return found
+def living(experiment: Experiment, first: int = 0) -> list[Individual]:
+    return [
+        replace(candidate(experiment, BirthId(3, first + n)).individual(0), fitness=n)
+        for n in range(6)
+    ]
 
 
 def parents(experiment: Experiment) -> None:
-    breeder = Breeder(experiment, 1, 0)
-    breeder.candidate(BIRTH, 0, living(breeder))
+    candidate(experiment, BIRTH, living(experiment))
 
 
 def survivors(experiment: Experiment) -> None:
-    breeder = Breeder(experiment, 1, 0)
-    brood = [
-        replace(one, birth=BirthId(3, 195 + at))
-        for at, one in enumerate(living(breeder))
-    ]
-    breeder.survivors([], brood)
+    Breeder(experiment, 1, 0).survivors([], living(experiment, 195))
 
 
-def row(experiment: Experiment) -> None:
-    found = Breeder(experiment, 1, 0).candidate(BIRTH, 0, ())
-    assert isinstance(found, Candidate)
-    birth_record(found, found.individual(0), encoding_of(experiment))
+def random(experiment: Experiment) -> None:
+    candidate(experiment, BIRTH)
 
 
 def learner(experiment: Experiment) -> None:
@@ -87,7 +76,7 @@ CASES = [
         "selection.survivors",
     ),
     (parents, 'encoding.type = "LAB:Crossing"', "encoding.type"),
-    (row, 'encoding.type = "LAB:Writing"', "encoding.type"),
+    (random, 'encoding.type = "LAB:Writing"', "encoding.type"),
     (parents, 'brain.type = "LAB:Wave"', ""),
     (learner, '[learning]\nlearner = "LAB:Asking"\nbudget = 4', "learning.learner"),
 ]

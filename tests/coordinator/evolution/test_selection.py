@@ -29,9 +29,10 @@ from schema.experiment.document import (
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
+from schema.wire.genome_bytes import encode_genome
 
 RELATIVES = Relatives(Robot)
-CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
+CORE = encode_genome(Node("Core", -1, 0, (0.5, 0.5, 0.5)))
 N = 4000
 
 

@@ -32,9 +32,10 @@ from schema.experiment.selection_rules import RuleSection
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
+from schema.wire.genome_bytes import encode_genome
 from tests.documents import parse_experiment
 
-CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
+CORE = encode_genome(Node("Core", -1, 0, (0.5, 0.5, 0.5)))
 
 LAB = """
 from typing import Any
@@ -100,9 +101,9 @@ def population(*sizes: int) -> list[Individual]:
     ]
 
 
-def chain(genome: int) -> Robot:
-    """Return a core and bricks, as many parts as the genome says."""
-    bricks = (Part("FixedBrick", at, 1, 0, 0, ()) for at in range(genome - 1))
+def chain(genome: bytes) -> Robot:
+    """Return a core and bricks, as many parts as the genome has bytes."""
+    bricks = (Part("FixedBrick", at, 1, 0, 0, ()) for at in range(len(genome) - 1))
     return Robot((Part("Core", -1, -1, -1, 0, ()), *bricks))
 
 
@@ -500,7 +501,7 @@ def test_one_class_selects_all_by_distance_of_bodies(
     rule = rule_of(section, name)
     sizes = [3, 7, 5, 7, 4, 3]
     everybody = [
-        structs.replace(one, genome=one.size, parents=(BirthId(9, one.size),))
+        structs.replace(one, genome=b"." * one.size, parents=(BirthId(9, one.size),))
         for one in population(*sizes)
     ]
     rule.update(everybody[:4])
@@ -515,7 +516,7 @@ def test_ancestors_of_those_that_have_lived_on_the_island() -> None:
     stranger, unknown = BirthId(9, 9), BirthId(9, 1)
     parents = [(), (), tuple(births[:2]), (births[2], stranger), (births[3], births[0])]
     living = [
-        Individual(birth, 3, 0.0, 1, 0, parents=known)
+        Individual(birth, b"...", 0.0, 1, 0, parents=known)
         for birth, known in [*zip(births, parents, strict=True), (stranger, (unknown,))]
     ]
     last = relatives.members(living)[4]

@@ -17,7 +17,6 @@ from coordinator.islands.events import (
     EvaluationFailed,
     Record,
     Started,
-    Vetted,
 )
 from coordinator.islands.island import Island
 from schema.errors import UnexpectedEvent
@@ -31,9 +30,9 @@ from schema.experiment.document import (
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Breed, Evaluate
+from tests.coordinator.breeding import bred
 from tests.coordinator.island_run import live, records, rows
-from tests.coordinator.reports import VIABLE
 
 BRIDGE = Experiment(
     name="test",
@@ -48,11 +47,9 @@ BRIDGE = Experiment(
 )
 
 
-def answer(command: Vet | Evaluate) -> Answered:
+def answer(command: Evaluate) -> Answered:
     """Evaluate by birth, trial and duration; every eleventh trial fails."""
     birth = command.birth
-    if isinstance(command, Vet):
-        return Vetted(birth, command.attempt, VIABLE)
     if (birth.number + 3 * command.trial) % 11 == 10:
         return EvaluationFailed(birth, "diverged", Provenance(), command.trial)
     fitness = (birth.number * 0.618 + command.trial * 0.37 + command.steps / 1e4) % 1.0
@@ -123,7 +120,9 @@ def test_a_brood_waits_for_all_re_evaluations() -> None:
         command = waiting.popleft()
         if isinstance(command, Evaluate) and command.trial:
             late.append(command)
-        elif isinstance(command, Vet | Evaluate):
+        elif isinstance(command, Breed):
+            waiting.extend(island.handle(bred(island, command)))
+        elif isinstance(command, Evaluate):
             waiting.extend(island.handle(answer(command)))
     assert island.births == 10
     assert [one.trial for one in late] == [1, 1, 1]
@@ -137,7 +136,7 @@ def test_a_brood_waits_for_all_re_evaluations() -> None:
     found = island.handle(answer(second))
     tables = [one.table for one in found if isinstance(one, Record)]
     assert tables == ["evaluations"] * 3 + ["population"] * 6
-    assert isinstance(found[-1], Vet)
+    assert isinstance(found[-1], Breed)
 
 
 def test_no_brood_exceeds_the_population_limit_or_the_births() -> None:

@@ -5,9 +5,9 @@ from hashlib import sha256
 import pytest
 from msgspec.structs import replace
 
-from coordinator.evolution.breeding import Breeder
-from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.founders import founders_of
+from coordinator.islands.events import Started
+from coordinator.islands.island import Island
 from schema.errors import ExperimentError
 from schema.experiment.document import (
     EncodingSection,
@@ -18,10 +18,10 @@ from schema.experiment.document import (
 )
 from schema.experiment.file import read_experiment
 from schema.experiment.learning import Learning
-from schema.robot.ids import BirthId
 from schema.tables.description import KeptFounder
+from schema.wire.messages import Breed
 from tests.coordinator.archipelago_run import ArchipelagoRun
-from tests.coordinator.arena_world import reject_some
+from tests.coordinator.breeding import bred, reject_some
 
 PLAIN = replace(read_experiment("scenario1"), births=40)
 ARENA = read_experiment("scenario3").arena
@@ -31,10 +31,11 @@ CASES = {
     "learning": replace(PLAIN, learning=Learning(learner="(1+1)-es", budget=2)),
     "islands": replace(PLAIN, islands=(Islands(count=2), Islands(arena=ARENA))),
 }
+OTHER = Island(PLAIN, 99, 0, 4)
 GENOMES = [
-    encoding_of(PLAIN).to_bytes(found.genome)
-    for number in range(3)
-    if (found := Breeder(PLAIN, 99, 0).candidate(BirthId(4, number), 0, ()))
+    child.genome
+    for work in OTHER.handle(Started())[:3]
+    if isinstance(work, Breed) and (child := bred(OTHER, work).child)
 ]
 """Genomes of another run."""
 NAMED = tuple(

@@ -15,8 +15,6 @@ from coordinator.islands.events import (
     Finish,
     IslandCommand,
     Started,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.islands.island import Island
 from schema.errors import ExperimentError, UnexpectedEvent
@@ -26,11 +24,12 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.tables.columns import ROWS
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Bred, Breed, Evaluate
 from schema.wire.protobuf import decode_genome
-from tests.coordinator.arena_world import reject_some, viable
+from tests.coordinator.breeding import bred, failed, reject_some
 from tests.coordinator.island_run import live, records, requests, rows
-from tests.coordinator.reports import CROWDED, PROVENANCE, VIABLE
+from tests.coordinator.reports import PROVENANCE
+from tests.coordinator.sent_requests import ROBOT
 
 BASELINES = ("no-selection", "no-reproduction")
 
@@ -45,41 +44,53 @@ def fitness_of(birth: BirthId) -> float:
     return (birth.number * 0.6180339887498949 + 0.1) % 1.0
 
 
-def answer(command: Vet | Evaluate) -> Answered:
-    """Reject some bodies; fail the simulation of every seventh birth."""
-    if isinstance(command, Evaluate) and command.birth.number % 7 == 3:
+def answer(command: Evaluate) -> Answered:
+    """Fail the simulation of every seventh birth."""
+    if command.birth.number % 7 == 3:
         return EvaluationFailed(command.birth, "diverged at 0.3 s", PROVENANCE)
-    return reject_some(command) if isinstance(command, Vet) else well(command)
+    return well(command)
 
 
-def well(command: Vet | Evaluate) -> Answered:
-    """Accept every body and every simulation."""
-    if isinstance(command, Vet):
-        return viable(command)
+def well(command: Evaluate) -> Evaluated:
+    """Accept every simulation."""
     fitness = fitness_of(command.birth)
     return Evaluated(command.birth, Evaluation(fitness, 0.1, 0.0, 12.0), PROVENANCE)
 
 
 def lived(seed: int = 11, run: int = 0, **selection: Any) -> list[IslandCommand]:  # noqa: ANN401 - any setting
-    return live(Island(small(**selection), seed, run), answer)
+    return live(Island(small(**selection), seed, run), answer, why_not=reject_some)
 
 
-def test_a_viable_body_is_evaluated_and_an_unviable_one_replaced() -> None:
+def test_a_child_is_evaluated_and_a_couple_without_one_replaced() -> None:
     island = Island(small(), 1, 0)
     first, second, *_ = requests(island.handle(Started()))
-    assert island.handle(well(first)) == [Evaluate(first.birth, first.robot)]
-    (again,) = island.handle(Vetted(second.birth, 0, CROWDED))
-    assert isinstance(again, Vet)
-    assert (again.birth, again.attempt) == (second.birth, 1)
-    assert again.robot != second.robot
-    (third,) = island.handle(VettingFailed(second.birth, 1, "broke"))
-    assert isinstance(third, Vet)
-    assert (third.birth, third.attempt) == (second.birth, 2)
+    event = bred(island, first)
+    assert event.child is not None
+    assert island.handle(event) == [Evaluate(first.birth, event.child.robot)]
+    assert (second.attempt, second.end, second.parents) == (0, 5, ())
+    (again,) = requests(island.handle(failed(second)))
+    assert again == replace(second, attempt=5, end=10)
+    later = bred(island, again)
+    assert later.child not in (None, bred(island, second).child)
+    for number in range(1, 6):
+        work = island._in_flight[number].request
+        island.handle(bred(island, work))
+    children: list[Breed] = []
+    for number in range(6):
+        children += requests(island.handle(well(Evaluate(BirthId(0, number), ROBOT))))
+    genomes = {one.birth: one.genome for one in island.population}
+    work = children[0]
+    assert len(set(work.parents)) == 2
+    assert set(work.parents) < set(genomes.values())
+    (other,) = island.handle(failed(work))
+    assert isinstance(other, Breed)
+    assert (other.attempt, other.end) == (5, 10)
+    assert other.parents != work.parents
 
 
 def test_a_whole_run_has_the_rows_and_columns_of_the_tables() -> None:
     island = Island(small(), 7, 2, number=3)
-    commands = live(island, answer)
+    commands = live(island, answer, why_not=reject_some)
     assert island.is_finished
     assert commands[-1] == Finish(3)
     assert sum(isinstance(one, Finish) for one in commands) == 1
@@ -118,13 +129,12 @@ def test_births_rows_describe_the_evaluated_robot() -> None:
     island = Island(experiment, 7, 0)
     judged = {}
 
-    def remember(command: Vet | Evaluate) -> Answered:
-        if isinstance(command, Evaluate):
-            judged[command.birth.number] = command.robot
+    def remember(command: Evaluate) -> Answered:
+        judged[command.birth.number] = command.robot
         return answer(command)
 
     attempts = set()
-    for row in rows(live(island, remember), "births"):
+    for row in rows(live(island, remember, why_not=reject_some), "births"):
         robot = judged[row["birth"]]
         genome = decode_genome(row["genome"])
         assert develop(genome, body_space(experiment.space)) == robot
@@ -175,19 +185,17 @@ def test_the_window_limits_births_in_flight_and_changes_none(window: int) -> Non
     island = Island(small(window=window), 11, 0)
     in_flight = []
 
-    def watched(command: Vet | Evaluate) -> Answered:
+    def watched(command: Evaluate) -> Answered:
         in_flight.append(len(island._in_flight) if island.births >= 6 else 0)
         return answer(command)
 
-    assert records(live(island, watched)) == records(lived())
+    assert records(live(island, watched, why_not=reject_some)) == records(lived())
     assert max(in_flight) == window
 
 
 def test_without_selection_fitness_decides_nothing() -> None:
-    def negated(command: Vet | Evaluate) -> Answered:
+    def negated(command: Evaluate) -> Answered:
         event = well(command)
-        if not isinstance(event, Evaluated):
-            return event
         fitness = -event.evaluation.fitness
         return replace(event, evaluation=replace(event.evaluation, fitness=fitness))
 
@@ -201,48 +209,42 @@ def test_without_selection_fitness_decides_nothing() -> None:
 @settings(max_examples=12, deadline=None)
 @given(st.lists(st.integers(0, 30), min_size=1, max_size=50))
 def test_the_order_of_answers_changes_no_record(turns: list[int]) -> None:
-    shuffled = live(Island(small(), 11, 0), answer, cycle(turns))
+    shuffled = live(Island(small(), 11, 0), answer, cycle(turns), reject_some)
     assert records(shuffled) == records(lived())
 
 
 IMPOSSIBLE = (
     (Started(), "it has started before"),
-    (EvaluationFailed(BirthId(0, 0), "why", PROVENANCE), "it has not been vetted"),
-    (Vetted(BirthId(0, 0), 1, VIABLE), "it is at attempt 0"),
-    (VettingFailed(BirthId(0, 0), 1, "why"), "it is at attempt 0"),
-    (Vetted(BirthId(0, 6), 0, VIABLE), "births 0..5 have begun"),
-    (Vetted(BirthId(1, 0), 0, VIABLE), "births 0..5 have begun"),
+    (EvaluationFailed(BirthId(0, 0), "why", PROVENANCE), "it has not been bred"),
+    (Bred(BirthId(0, 0), 5, ("why",)), "it is at attempt 0"),
+    (Bred(BirthId(0, 6), 0), "births 0..5 have begun"),
+    (Bred(BirthId(1, 0), 0), "births 0..5 have begun"),
 )
 
 
 def test_impossible_events_raise_and_change_nothing() -> None:
     island = Island(small(), 11, 0)
+    tried: list[int] = []
 
-    def provoked(command: Vet | Evaluate) -> Answered:
+    def provoked(birth: BirthId, attempt: int) -> str:
         # Before the first answer.
-        if isinstance(command, Vet) and command.birth.number == command.attempt == 0:
-            for event, why in IMPOSSIBLE:
-                with pytest.raises(UnexpectedEvent, match=why):
-                    island.handle(event)
-        return answer(command)
+        for event, why in () if tried else IMPOSSIBLE:
+            with pytest.raises(UnexpectedEvent, match=why):
+                island.handle(event)
+        tried.append(attempt)
+        return reject_some(birth, attempt)
 
-    assert records(live(island, provoked)) == records(lived())
-
-
-def never(command: Vet | Evaluate) -> Answered:
-    """Reject every body."""
-    assert isinstance(command, Vet)
-    return Vetted(command.birth, command.attempt, CROWDED)
+    assert records(live(island, answer, why_not=provoked)) == records(lived())
 
 
 def test_an_error_is_raised_if_no_child_is_ever_viable() -> None:
-    def barren(command: Vet | Evaluate) -> Answered:
-        return well(command) if command.birth.number < 6 else never(command)
+    def barren(birth: BirthId, _attempt: int) -> str:
+        return "" if birth.number < 6 else "crowded"
 
     with pytest.raises(
-        ExperimentError, match=r"birth 6 of island 0: .* = 500 attempts"
+        ExperimentError, match=r"birth 6 of island 0: .* = 500 attempts.*: crowded;"
     ):
-        live(Island(small(), 11, 0), barren)
+        live(Island(small(), 11, 0), well, why_not=barren)
 
 
 @pytest.mark.parametrize("name", ["scenario1", "scenario2", *BASELINES])
@@ -250,7 +252,7 @@ def test_the_shipped_experiments_run_to_their_end(name: str) -> None:
     experiment = replace(read_experiment(name), births=50)
     assert experiment.name == name
     island = Island(experiment, 1, 0)
-    commands = live(island, answer)
+    commands = live(island, answer, why_not=reject_some)
     assert island.is_finished
     assert len(rows(commands, "births")) == 50
     assert len(island.population) == 15

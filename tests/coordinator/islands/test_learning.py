@@ -18,7 +18,6 @@ from coordinator.islands.events import (
     EvaluationFailed,
     IslandCommand,
     Started,
-    Vetted,
 )
 from coordinator.islands.island import Island
 from coordinator.run.learners import Learners
@@ -37,11 +36,11 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
-from schema.wire.messages import Evaluate, Vet
+from schema.wire.messages import Evaluate
 from schema.wire.protobuf import decode_genome, decode_robot
-from tests.coordinator.arena_world import viable
+from tests.coordinator.breeding import bred
 from tests.coordinator.island_run import live, records, requests, rows
-from tests.coordinator.reports import PROVENANCE, VIABLE
+from tests.coordinator.reports import PROVENANCE
 
 FIRST = BirthId(0, 0)
 PLAIN = Experiment(
@@ -75,9 +74,7 @@ def lived(
     island = Island(experiment, 1, 0)
     learners = Learners({0: experiment}, Origin(seed=1))
 
-    def answer(command: Vet | Evaluate | Ask) -> Answered:
-        if isinstance(command, Vet):
-            return viable(command)
+    def answer(command: Evaluate | Ask) -> Answered:
         is_ask = isinstance(command, Ask)
         return learners.answer(command) if is_ask else judge(command)  # type: ignore[arg-type]
 
@@ -87,8 +84,8 @@ def lived(
 def begun(experiment: Experiment) -> tuple[Island, list[Any]]:
     """Return an island whose first body is viable, and the requests that follow."""
     island = Island(experiment, 1, 0)
-    island.handle(Started())
-    return island, requests(island.handle(Vetted(FIRST, 0, VIABLE)))
+    first, *_ = requests(island.handle(Started()))
+    return island, requests(island.handle(bred(island, first)))
 
 
 def test_a_budget_of_one_is_no_learning() -> None:
@@ -156,7 +153,7 @@ def test_the_best_trial_counts_and_is_inherited_or_not(
             assert weight_sum(inherited) == found[0]
     assert learnt > 8
     for one in island.population:
-        robot = one.learnt or develop(one.genome, types)  # type: ignore[arg-type]
+        robot = one.learnt or develop(decode_genome(one.genome), types)
         assert weight_sum(robot) == one.fitness
 
 

@@ -208,9 +208,9 @@ def test_a_failed_immigrant_is_no_fitter_than_a_negative_native() -> None:
     migration = island._migration
     assert migration is not None
     natives = [
-        Individual(BirthId(0, number), None, -1.0 - number, 1, 0) for number in range(4)
+        Individual(BirthId(0, number), b"", -1.0 - number, 1, 0) for number in range(4)
     ]
-    failed = Individual(BirthId(1, 0), None, 0.5, 1, 0).evaluated(None, ())
+    failed = Individual(BirthId(1, 0), b"", 0.5, 1, 0).evaluated(None, ())
     # It replaces the worst, number 3, and is then as fit as number 2.
     found = migration._settle(natives, [failed])
     assert [(one.birth, one.fitness) for one in found] == [

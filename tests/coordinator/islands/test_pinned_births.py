@@ -19,7 +19,7 @@ from schema.experiment.file import read_experiment
 from schema.experiment.learning import Learning
 from schema.experiment.migration import Migration
 from tests.coordinator.archipelago_run import ArchipelagoRun
-from tests.coordinator.arena_world import reject_some
+from tests.coordinator.breeding import reject_some
 
 
 def shipped(name: str, births: int, **changes: Any) -> Experiment:  # noqa: ANN401 - any setting

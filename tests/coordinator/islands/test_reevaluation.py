@@ -19,11 +19,13 @@ from schema.experiment.document import (
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
+from schema.wire.genome_bytes import encode_genome
 from schema.wire.messages import Evaluate
 
 CORE = Node("Core", -1, 0, ())
 SPACE = body_space(Experiment(name="test").space)
 ROBOT = develop(CORE, SPACE)
+GENOME = encode_genome(CORE)
 
 
 def reevaluations(**rules: Any) -> Reevaluations:  # noqa: ANN401 - any setting
@@ -51,7 +53,7 @@ def steps(
 
 
 def one(number: int, fitness: float = 0.5, island: int = 0) -> Individual:
-    return Individual(BirthId(island, number), CORE, fitness, 1, 0)
+    return Individual(BirthId(island, number), GENOME, fitness, 1, 0)
 
 
 def judged(number: int, trial: int, fitness: float) -> Evaluated:
@@ -174,7 +176,7 @@ def test_a_failed_trial_counts_as_zero_or_as_the_least_below(
 
 def test_a_robot_that_failed_at_birth_may_succeed_later() -> None:
     found = reevaluations(fitness="mean")
-    population = (Individual(BirthId(0, 0), CORE, 0.0, 1, 0, has_failed=True),)
+    population = (Individual(BirthId(0, 0), GENOME, 0.0, 1, 0, has_failed=True),)
     found.start(9, population)
     found.take(judged(0, 1, 0.6))
     ((first,), _) = found.conclude(population)

@@ -4,8 +4,10 @@ import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
+from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.islands.rows import evaluation_record, named_measures, sizes
+from schema.experiment.document import Experiment
 from schema.parts import BUILT_IN
 from schema.robot.genome import ConnectionGene, Node, develop
 from schema.robot.ids import BirthId
@@ -41,7 +43,11 @@ def test_sizes_of_a_small_robot() -> None:
     hinge = node("ActiveHinge", (1, touch), hidden=(NEURON,), connections=(loop,))
     passive = node("Hinge", (1, node("FixedBrick")))
     core = node("Core", (0, hinge), (3, passive), hidden=(NEURON, NEURON))
-    assert sizes(develop(core, BUILT_IN), core, BUILT_IN) == {
+    robot = develop(core, BUILT_IN)
+    encoding = encoding_of(Experiment(name="test"))
+    assert encoding.newborn(core, robot).connections == 2
+    assert len(robot.brain.connections) == 1
+    assert sizes(robot, BUILT_IN) == {
         "parts": 5,
         "joints": 2,
         "motors": 1,
@@ -49,15 +55,7 @@ def test_sizes_of_a_small_robot() -> None:
         "inputs": 8,
         "outputs": 1,
         "hidden": 3,
-        "connections": 2,
     }
-
-
-def test_connections_of_other_genomes_are_those_of_the_robot() -> None:
-    loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
-    core = node("Core", (0, node("ActiveHinge", connections=(loop,))))
-    robot = develop(core, BUILT_IN)
-    assert sizes(robot, "a genome of another type", BUILT_IN)["connections"] == 1
 
 
 @pytest.mark.parametrize("length", [0, 1, 3])
@@ -66,5 +64,5 @@ def test_a_tree_with_one_leaf_has_one_extremity(length: int) -> None:
     for _ in range(length):
         chain = ((1, node("FixedBrick", *chain)),)
     core = node("Core", *chain)
-    counts = sizes(develop(core, BUILT_IN), core, BUILT_IN)
+    counts = sizes(develop(core, BUILT_IN), BUILT_IN)
     assert (counts["parts"], counts["extremities"]) == (length + 1, 1)

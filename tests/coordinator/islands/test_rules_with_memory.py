@@ -15,13 +15,8 @@ from schema.experiment.migration import Migration
 from schema.plugins import permission
 from schema.robot.ids import BirthId
 from tests.coordinator.archipelago_run import ArchipelagoRun
-from tests.coordinator.arena_world import (
-    ArenaRun,
-    World,
-    distinct_fitness,
-    experiment,
-    reject_some,
-)
+from tests.coordinator.arena_world import ArenaRun, World, distinct_fitness, experiment
+from tests.coordinator.breeding import reject_some
 
 WITNESS = """
 class Witness:

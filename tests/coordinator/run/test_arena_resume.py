@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import analyzer.report
+import tests.analyzers
 from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
@@ -127,7 +127,7 @@ class Run:
         stack.callback(self.rows.close)
         shards = other.pop("shards", None) or Shards(FakeWorld)
         worker = other.pop("worker", Jobs(shards).answer)
-        agents = {"analyzer": analyzer.report.answer, "worker": worker}
+        agents = {"analyzer": tests.analyzers.answer, "worker": worker}
         islands = archipelago(document, DETAILS.seed, DETAILS.run)
         self.arena: Any = islands[0]
         platform = other.pop("platform", "any")
@@ -290,7 +290,7 @@ def ordered(path: Path, point: Point) -> list[str]:
                 living = [each.birth for each in one.arena.population]
                 if one.arena.step == 12000 and not one.arena.is_paused:
                     genome = one.arena.population[1].genome
-                    guest = one.arena.encoding.develop(genome)
+                    guest = one.arena.encoding.robot_of(genome)
                     said.append(one.ask(RemoveRobot(living[0]), "remove"))
                     said.append(one.ask(InsertRobot(guest, (0.5, 1.5)), "insert"))
                     said.append(one.ask(PauseArena(), "pause"))

@@ -8,16 +8,13 @@ from coordinator.islands.events import (
     Audited,
     Evaluated,
     EvaluationFailed,
-    VettingFailed,
 )
-from coordinator.run.cross_checks import CrossChecks, audit_records, describe
+from coordinator.run.cross_checks import Checks, CrossChecks, audit_records, describe
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from schema.robot.robot import Part, Robot
 from schema.tables.columns import ROWS
-from schema.wire.messages import Evaluate
+from schema.wire.messages import Bred
 
-ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 BIRTH = BirthId(2, 7)
 ONE = Evaluated(BIRTH, Evaluation(0.25, 0.0, 0.05, 12.0), Provenance("a", "p", 0.1))
 OTHER = replace(ONE, provenance=Provenance("b", "q", 0.7))
@@ -26,9 +23,8 @@ FAILED = EvaluationFailed(BIRTH, "flew away", Provenance("c", "p", 0.1))
 
 
 def chosen(share: float) -> list[int]:
-    audits = CrossChecks(share)
-    births = (Evaluate(BirthId(0, number), ROBOT) for number in range(4000))
-    return [each.birth.number for each in births if audits.chooses(each)]
+    checks = Checks(share)
+    return [n for n in range(4000) if checks.chooses(BirthId(0, n), 0)]
 
 
 def test_birth_decides_whether_an_evaluation_is_checked() -> None:
@@ -43,7 +39,7 @@ def test_birth_decides_whether_an_evaluation_is_checked() -> None:
 
 def test_first_job_of_equal_answers_counts_in_any_order() -> None:
     for order in ((4, 5), (5, 4)):
-        audits = CrossChecks(1.0)
+        audits = CrossChecks()
         audits.pair(4, 5)
         outcomes = {4: ONE, 5: OTHER}
         first, second = order
@@ -54,7 +50,7 @@ def test_first_job_of_equal_answers_counts_in_any_order() -> None:
 
 @pytest.mark.parametrize("other", [FAILED, replace(DIFFERENT)])
 def test_different_answers_give_no_result(other: Evaluated | EvaluationFailed) -> None:
-    audits = CrossChecks(1.0)
+    audits = CrossChecks()
     audits.pair(4, 5)
     audits.settle(5, other)
     (audited,) = audits.settle(4, replace(ONE, evaluation=_far()))
@@ -81,7 +77,7 @@ def test_two_quarantines_settle_an_audit_whatever_ended_the_processes() -> None:
         EvaluationFailed(BIRTH, f"{QUARANTINED}by {cause}", Provenance(worker))
         for worker, cause in (("a", "CPU limit"), ("b", "SIGSEGV"))
     )
-    audits = CrossChecks(1.0)
+    audits = CrossChecks()
     audits.pair(4, 5)
     assert audits.settle(5, second) == []
     assert audits.settle(4, first) == [Audited(first, second), first]
@@ -91,10 +87,10 @@ def test_two_quarantines_settle_an_audit_whatever_ended_the_processes() -> None:
 
 
 def test_outcome_of_a_single_job_passes_unchanged() -> None:
-    audits = CrossChecks(1.0)
-    vetted = VettingFailed(BIRTH, 0, "why")
+    audits = CrossChecks()
+    bred = Bred(BIRTH, 0, ("why",))
     assert audits.settle(1, ONE) == [ONE]
-    assert audits.settle(2, vetted) == [vetted]
+    assert audits.settle(2, bred) == [bred]
 
 
 def test_rows_have_the_columns_of_their_table() -> None:

@@ -21,8 +21,7 @@ from schema.limits import ADVANCE_BYTES, MOST_LIVING
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Judgement
 from schema.wire.codec import decode, encode
-from schema.wire.messages import Answer, CallValue, Result
-from tests.coordinator.reports import VIABLE
+from schema.wire.messages import Answer, Bred, CallValue, Result
 from tests.coordinator.run.test_arena_resume import Run
 from tests.coordinator.sent_requests import JUDGED
 
@@ -96,8 +95,8 @@ LIES: dict[str, tuple[AgentKind, Lie]] = {
     "too many deaths": ("worker", saying(ENDLESS)),
     "30 MB of text": ("worker", saying(CallValue(b"x" * 30_000_000))),
     "no message": ("worker", lambda _: b"\xff"),
-    "no reason": ("analyzer", saying(replace(VIABLE, is_viable=False))),
-    "evaluation for a report": ("analyzer", saying(JUDGED)),
+    "no child": ("analyzer", saying(Bred(BirthId(0, 0), 0))),
+    "evaluation for a child": ("analyzer", saying(JUDGED)),
 }
 
 

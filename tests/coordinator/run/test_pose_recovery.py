@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-import analyzer.report
+import tests.analyzers
 from coordinator.dispatch.events import AgentKind, Joined
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
@@ -57,7 +57,7 @@ def execute(
     """
     held = RunFolder(path, None if path.exists() else details_of(document))
     agents: dict[AgentKind, Compute] = {
-        "analyzer": analyzer.report.answer,
+        "analyzer": tests.analyzers.answer,
         "worker": Jobs(Shards(world)).answer,
     }
     local = LocalAgents(agents, platforms[0])

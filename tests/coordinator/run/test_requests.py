@@ -1,5 +1,6 @@
 """Requests about single robots: results of answers, and lies that are refused."""
 
+import dataclasses
 import math
 from functools import partial
 from typing import Literal
@@ -12,19 +13,25 @@ from coordinator.islands.events import (
     QUARANTINED,
     Evaluated,
     EvaluationFailed,
-    Vetted,
-    VettingFailed,
 )
+from coordinator.islands.island import Island
+from coordinator.run.cross_checks import Checks
 from coordinator.run.requests import read_evaluation
-from schema.errors import JobRefused, MalformedMessage
-from schema.experiment.identity import NO_ORIGIN, Origin
+from schema.errors import ExperimentError, JobRefused, MalformedMessage
+from schema.experiment.identity import Origin
 from schema.limits import ANSWER_BYTES, LONGEST_REASON
+from schema.robot.brain import Connection
+from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
+from schema.robot.robot import Part, Robot
 from schema.wire.codec import encode, fingerprint
+from schema.wire.genome_bytes import encode_genome
 from schema.wire.messages import (
     Answer,
     Array,
+    Bred,
+    Breed,
     Crash,
     Evaluate,
     Failure,
@@ -34,22 +41,25 @@ from schema.wire.messages import (
     RunningJob,
     StateMissing,
     Traced,
-    Vet,
 )
-from tests.coordinator.reports import CROWDED, VIABLE
+from tests.coordinator.breeding import bred, failed
 from tests.coordinator.sent_requests import (
     BIRTH,
     EPOCH,
+    EXPERIMENT,
     JUDGED,
     ORIGIN,
     ROBOT,
+    SETTINGS,
     SentRequests,
     request_of,
 )
 
-EVALUATE, VET = Evaluate(BIRTH, ROBOT), Vet(BIRTH, 2, ROBOT)
-ASKED = pytest.mark.parametrize("ask", [EVALUATE, VET], ids=["evaluate", "vet"])
-SETTINGS = b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
+ISLAND = Island(EXPERIMENT, ORIGIN.seed, ORIGIN.run)
+EVALUATE, BREED = Evaluate(BIRTH, ROBOT), Breed(BIRTH, 5, 10)
+CHILD = bred(ISLAND, BREED, lambda _, attempt: "crowded" if attempt < 7 else "")
+ASKED = pytest.mark.parametrize("ask", [EVALUATE, BREED], ids=["evaluate", "breed"])
+EVALUATION = b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
 
 
 @pytest.fixture
@@ -60,31 +70,31 @@ def sent_requests() -> SentRequests:
 @pytest.mark.parametrize(
     ("work", "settings", "plugins", "origin"),
     [
-        (VET, b'"vetting"', "", NO_ORIGIN),
         # The plug-in is not here.
-        (Evaluate(BIRTH, ROBOT, 1, 300), SETTINGS, "plugged=", ORIGIN),
+        (BREED, SETTINGS, "plugged=", ORIGIN),
+        (Evaluate(BIRTH, ROBOT, 1, 300), EVALUATION, "plugged=", ORIGIN),
         # Noise depends on the requesting island.
         (
             Evaluate(BirthId(3, 9), ROBOT, trial=4, requester=2),
-            SETTINGS,
+            EVALUATION,
             "plugged=",
             replace(ORIGIN, island=2),
         ),
     ],
 )
 def test_a_request_carries_the_run_the_work_and_all_that_it_depends_on(
-    work: Vet | Evaluate, settings: bytes, plugins: str, origin: Origin
+    work: Breed | Evaluate, settings: bytes, plugins: str, origin: Origin
 ) -> None:
-    sent_requests = SentRequests(SETTINGS)
+    sent_requests = SentRequests(EVALUATION)
     sent_requests.requests.send(work)
     ((number, agent, payload),) = sent_requests.sent
-    assert agent == ("judge" if isinstance(work, Vet) else "one")
+    assert agent == ("judge" if isinstance(work, Breed) else "one")
     expected = Request("run", EPOCH, number, work, settings, plugins, origin)
     assert request_of(payload) == expected
 
 
 def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
-    sent_requests = SentRequests(audit=1.0)
+    sent_requests = SentRequests(checks=Checks(1.0))
     sent_requests.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
     first, second = (request_of(payload) for _, _, payload in sent_requests.sent)
     assert first.number != second.number
@@ -105,19 +115,13 @@ LINE = "?[2Jgone second? line".ljust(LONGEST_REASON - 3, "x") + "..."
         (EVALUATE, Failure(TEXT), EvaluationFailed(BIRTH, LINE, SIGNED)),
         # Only the coordinator knows of a quarantine.
         (EVALUATE, Failure(CLAIM), EvaluationFailed(BIRTH, f"failed: {CLAIM}", SIGNED)),
-        (VET, VIABLE, Vetted(BIRTH, 2, VIABLE)),
-        (VET, CROWDED, Vetted(BIRTH, 2, CROWDED)),
-        (VET, Failure("no box"), VettingFailed(BIRTH, 2, "no box")),
-        (VET, Failure(TEXT), VettingFailed(BIRTH, 2, LINE)),
-        (
-            VET,
-            replace(CROWDED, reason=TEXT),
-            Vetted(BIRTH, 2, replace(CROWDED, reason=LINE)),
-        ),
+        (BREED, CHILD, CHILD),
+        (BREED, failed(BREED), failed(BREED)),
+        (BREED, failed(BREED, TEXT), failed(BREED, LINE)),
     ],
 )
 def test_an_answer_gives_an_event(
-    sent_requests: SentRequests, ask: Vet | Evaluate, result: Result, event: object
+    sent_requests: SentRequests, ask: Breed | Evaluate, result: Result, event: object
 ) -> None:
     sent_requests.requests.send(ask)
     assert sent_requests.tell(sent_requests.reply(result)) == [event]
@@ -125,9 +129,9 @@ def test_an_answer_gives_an_event(
 
 @ASKED
 def test_robot_that_crashes_three_processes_is_quarantined(
-    sent_requests: SentRequests, ask: Vet | Evaluate
+    sent_requests: SentRequests, ask: Breed | Evaluate
 ) -> None:
-    kind: AgentKind = "analyzer" if isinstance(ask, Vet) else "worker"
+    kind: AgentKind = "analyzer" if isinstance(ask, Breed) else "worker"
     sent_requests.tell(Joined("third", kind, 1, "p"))
     sent_requests.requests.send(ask)
     for _ in range(3):
@@ -146,8 +150,8 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     why = "ended its own process 3 times, by SIGSEGV"
     signed = Provenance(killed[-1])
     assert told[-1] == [
-        VettingFailed(BIRTH, 2, f"the analyzer {why}")
-        if isinstance(ask, Vet)
+        failed(BREED, f"the analyzer {why}")
+        if isinstance(ask, Breed)
         else EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
     ]
 
@@ -156,29 +160,62 @@ EVALUATIONS: dict[str, Result] = {
     "fitness not a number": replace(JUDGED, fitness=math.nan),
     "infinite velocity": replace(JUDGED, path_velocity=math.inf),
     "a measure that is not asked for": replace(JUDGED, measures=(1.0,)),
-    "a report": VIABLE,
+    "a child": CHILD,
     "the result of another kind of job": StateMissing(),
 }
-REPORTS: dict[str, Result] = {
-    "corner not a number": replace(VIABLE, upper=(1.0, math.nan, 1.0)),
-    "infinite mass": replace(VIABLE, mass=math.inf),
-    "viable with a reason": replace(VIABLE, reason="parts 0 and 1 intersect"),
-    "not viable without a reason": replace(CROWDED, reason=""),
+
+
+def child(**changes: object) -> Bred:
+    """Return the outcome with other fields of the newborn."""
+    assert CHILD.child is not None
+    return replace(CHILD, child=replace(CHILD.child, **changes))
+
+
+def brain(weight: float) -> Robot:
+    """Return the child's robot with another weight, or one to nowhere."""
+    assert CHILD.child is not None
+    robot = CHILD.child.robot
+    target = 0 if math.isfinite(weight) else 9999
+    edges = (*robot.brain.connections, Connection(0, target, 0.5))
+    return replace(robot, brain=replace(robot.brain, connections=edges))
+
+
+def parts(*kinds: str) -> Robot:
+    """Return a robot without a brain."""
+    more = (Part(each, at, 1, 0, 0, GREY) for at, each in enumerate(kinds))
+    return Robot((Part("Core", -1, -1, -1, 0, GREY), *more))
+
+
+GREY = (0.5, 0.5, 0.5)
+LIES: dict[str, Result] = {
+    "birth of another request": replace(CHILD, birth=BirthId(0, 8)),
+    "other attempts": replace(CHILD, attempt=0),
+    "too many attempts": replace(CHILD, reasons=("crowded",) * 5),
+    "no child in too many attempts": replace(failed(BREED), reasons=("x",) * 6),
+    "no child in too few attempts": replace(failed(BREED), reasons=("x",) * 4),
+    "too few parts": child(robot=parts("FixedBrick")),
+    "too many parts": child(robot=parts(*["FixedBrick"] * 30)),
+    "unknown part": child(robot=parts("FixedBrick", "Wheel")),
+    "parts in a circle": child(robot=Robot(parts("FixedBrick").parts[1:])),
+    "connection to an input": child(robot=brain(1.0)),
+    "connection to nowhere": child(robot=brain(math.inf)),
+    "no genome": child(genome=b"\xff"),
+    "genome of another body": child(genome=encode_genome(Node("Core", -1, 0, GREY))),
     "an evaluation": JUDGED,
 }
 
 
 def check_refused(
-    sent_requests: SentRequests, ask: Vet | Evaluate, lie: Returned
+    sent_requests: SentRequests, ask: Breed | Evaluate, lie: Returned
 ) -> None:
     """Fail unless a lie is counted, its agent backs off, and another gets the job."""
     liar, honest = lie.agent, {"one": "two", "judge": "juror"}[lie.agent]
     assert sent_requests.tell(lie) == []
     assert sent_requests.fleet.faults.total("malformed") == 1
     assert [agent for _, agent, _ in sent_requests.sent] == [liar, honest]
-    result = VIABLE if isinstance(ask, Vet) else JUDGED
+    result = CHILD if isinstance(ask, Breed) else JUDGED
     (event,) = sent_requests.tell(sent_requests.reply(result))
-    assert isinstance(event, Vetted | Evaluated)
+    assert isinstance(event, Bred | Evaluated)
     # A new job goes to the honest agent, although the other one is idle, too.
     sent_requests.requests.send(ask)
     assert sent_requests.sent[-1][1] == honest
@@ -192,15 +229,51 @@ def check_refused(
     ("ask", "lie"),
     [
         *((EVALUATE, lie) for lie in EVALUATIONS.values()),
-        *((VET, lie) for lie in REPORTS.values()),
+        *((BREED, lie) for lie in LIES.values()),
     ],
-    ids=[*EVALUATIONS, *REPORTS],
+    ids=[*EVALUATIONS, *LIES],
 )
 def test_false_result_is_refused(
-    sent_requests: SentRequests, ask: Vet | Evaluate, lie: Result
+    sent_requests: SentRequests, ask: Breed | Evaluate, lie: Result
 ) -> None:
     sent_requests.requests.send(ask)
     check_refused(sent_requests, ask, sent_requests.reply(lie))
+
+
+@pytest.mark.parametrize("own", [Failure("no robot"), CHILD])
+def test_a_failure_ends_the_run_if_this_process_fails_too(own: Failure | Bred) -> None:
+    sent_requests = SentRequests(checks=Checks(breed=lambda _: own))
+    sent_requests.requests.send(BREED)
+    told = sent_requests.reply(Failure("no robot"))
+    if own != CHILD:
+        with pytest.raises(ExperimentError, match="no robot"):
+            sent_requests.tell(told)
+        return
+    assert sent_requests.tell(told) == []
+    assert sent_requests.fleet.faults.total("malformed") == 1
+    assert sent_requests.sent[-1][1] == "juror"
+    assert sent_requests.tell(sent_requests.reply(CHILD)) == [CHILD]
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_only_an_audit_finds_a_child_that_is_not_of_its_parents(share: float) -> None:
+    def again(request: Request) -> Bred:
+        assert isinstance(request.work, Breed)
+        assert (request.settings, request.origin) == (SETTINGS, ORIGIN)
+        return CHILD
+
+    sent_requests = SentRequests(checks=Checks(share, breed=again))
+    sent_requests.requests.send(BREED)
+    lie = replace(bred(ISLAND, replace(BREED, birth=BirthId(0, 8))), birth=BIRTH)
+    events = sent_requests.tell(sent_requests.reply(lie))
+    if not share:
+        assert events == [lie]
+        return
+    assert events == []
+    ((fault, peer, _),) = map(dataclasses.astuple, sent_requests.fleet.faults.counts)
+    assert (fault, peer) == ("malformed", "judge")
+    assert sent_requests.sent[-1][1] == "juror"
+    assert sent_requests.tell(sent_requests.reply(CHILD)) == [CHILD]
 
 
 @ASKED
@@ -219,12 +292,12 @@ def test_false_result_is_refused(
 )
 def test_an_answer_of_no_such_job_is_refused(
     sent_requests: SentRequests,
-    ask: Vet | Evaluate,
+    ask: Breed | Evaluate,
     changes: dict[str, object],
     kind: str,
 ) -> None:
     sent_requests.requests.send(ask)
-    result = VIABLE if isinstance(ask, Vet) else JUDGED
+    result = CHILD if isinstance(ask, Breed) else JUDGED
     lie = sent_requests.reply(result, **changes)
     job = sent_requests.fleet.dispatch.job(lie.number)
     assert job is not None

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-import analyzer.report
+import tests.analyzers
 import tests.null_workers
 from coordinator.dispatch.events import DispatchEvent, Joined, Returned
 from coordinator.dispatch.fleet import Agents, JobRouter
@@ -35,7 +35,10 @@ CAMPAIGN = Campaign(EXPERIMENTS, 2, 3)
 
 
 def local(kind: type[LocalAgents] = LocalAgents) -> LocalAgents:
-    answers = {"analyzer": analyzer.report.answer, "worker": tests.null_workers.answer}
+    answers = {
+        "analyzer": tests.analyzers.answer,
+        "worker": tests.null_workers.answer,
+    }
     return kind(answers, "any")  # type: ignore[arg-type]
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-import analyzer.report
+import tests.analyzers
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.network.local import LocalAgents
 from coordinator.run.history import arena_history
@@ -81,7 +81,7 @@ def advanced(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[float
     worker = Jobs(Shards(World))
     fleet = JobRouter(
         LocalAgents(
-            {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"
+            {"analyzer": tests.analyzers.answer, "worker": worker.answer}, "any"
         )
     )
     held = RunFolder(place / "run", details)

@@ -17,7 +17,6 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from coordinator.islands.events import VettingFailed
 from coordinator.storage.folder import RunFolder, read_details
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
@@ -31,6 +30,7 @@ from schema.tables.description import (
     read_description,
     read_state,
 )
+from schema.wire.messages import Bred
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
 MINOR = VERSION.rpartition(".")[0]
@@ -118,7 +118,7 @@ def test_a_lost_epoch_voids_nothing_that_is_written_later(
     """The file is missing, or an older one has replaced it."""
     path = tmp_path / "run"
     RunFolder(path, DETAILS).close()
-    events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(5)]
+    events = [Bred(BirthId(0, number), 0, ("refused",)) for number in range(5)]
     for number, event in enumerate(events):
         if number == 2 and left is None:
             (path / "epoch").unlink()
@@ -290,7 +290,7 @@ def test_a_damaged_epoch_is_replaced_by_one_after_that_of_the_journal(
 ) -> None:
     """No record that the next coordinator writes is void."""
     path = tmp_path / "run"
-    events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(2)]
+    events = [Bred(BirthId(0, number), 0, ("refused",)) for number in range(2)]
     RunFolder(path, DETAILS).close()
     for event in events:
         with opened(path) as (folder, journal):

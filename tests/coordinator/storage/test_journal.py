@@ -28,8 +28,6 @@ from coordinator.islands.events import (
     Remove,
     ReplaceBrain,
     Resume,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.storage.journal import (
     MAGIC,
@@ -42,21 +40,14 @@ from schema.errors import RunFolderError
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.results import Evaluation, Provenance
 from schema.wire.arena import NO_POSES, Advance, Casualty, Judgement, Poses, Touch
 from schema.wire.genome_bytes import encode_genome
+from schema.wire.messages import Bred, Newborn
+from tests.coordinator.sent_requests import ROBOT
 from tests.schema.wire.message_examples import messages_of
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
-REFUSED = Report(
-    is_viable=False,
-    reason="parts 1 (Hinge) and 3 (FixedBrick) intersect",
-    intersections=((1, 3), (2, 5)),
-    lower=(-0.1, -0.2, -0.0225),
-    upper=(0.1, 1 / 3, 0.0225),
-    mass=0.1234,
-    motors=2,
-)
 CORE = encode_genome(Node("Core", -1, 0, ()))
 SIGNED = Provenance("w", "x", 0.25)
 JUDGED = Judgement(
@@ -87,8 +78,8 @@ JUDGED_TWICE = Evaluated(
     BirthId(0, 0), Evaluation(0.1 + 0.2, 1e-300, 0.3, 12.0, (0.25, -3.0)), SIGNED, 1, 2
 )
 EVENTS: list[JournalledEvent] = [
-    Vetted(BirthId(0, 0), 2, REFUSED),
-    VettingFailed(BirthId(1, 7), 4, "three analyzers raised KeyError: 'Wheel'"),
+    Bred(BirthId(0, 0), 2, ("parts 1 and 3 intersect",), Newborn(CORE, ROBOT, 7)),
+    Bred(BirthId(1, 7), 4, ("the analyzer ended its own process 3 times",)),
     JUDGED_TWICE,
     EvaluationFailed(BirthId(0, 1), "diverged at 3.2 s", SIGNED),
     Audited(JUDGED_TWICE, replace(JUDGED_TWICE, provenance=Provenance("v"))),
@@ -220,12 +211,12 @@ def test_a_killed_process_loses_no_confirmed_record(tmp_path: Path) -> None:
     program = """
 import sys
 from pathlib import Path
-from coordinator.islands.events import VettingFailed
+from schema.wire.messages import Bred
 from coordinator.storage.journal import Journal
 from schema.robot.ids import BirthId
 journal = Journal.open(Path(sys.argv[1]))
 for number in range(10**9):
-    journal.append([VettingFailed(BirthId(0, number), 0, "x" * (number % 50))])
+    journal.append([Bred(BirthId(0, number), 0, ("x" * (number % 50),))])
     print(number, flush=True)
 """
     with subprocess.Popen(
@@ -239,7 +230,7 @@ for number in range(10**9):
     sure = int(said[-1]) if said else last
     with Journal.open(tmp_path) as journal:
         history = journal.replay()
-    births = [one.birth.number for one in history if isinstance(one, VettingFailed)]
+    births = [one.birth.number for one in history if isinstance(one, Bred)]
     assert births == list(range(len(births)))
     assert len(births) > sure
 

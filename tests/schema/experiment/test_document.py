@@ -30,12 +30,12 @@ from schema.experiment.robust import Robust
 from schema.experiment.settings import (
     EvaluationSettings,
     arena_settings,
+    breeding_settings,
     evaluation_settings,
     evaluation_settings_of,
     read_arena_settings,
+    read_breeding_settings,
     read_evaluation_settings,
-    read_vetting_settings,
-    vetting_settings,
 )
 from schema.parts import BUILT_IN
 from tests.documents import parse, parse_experiment
@@ -195,7 +195,7 @@ def test_part_types_of_users_and_built_in_ones_mix() -> None:
     types = body_space(experiment.space)
     assert list(types) == ["Core", "Flipper", "ActiveHinge"]
     assert types["Flipper"].inputs == 1
-    settings = read_vetting_settings(vetting_settings(experiment))
+    settings = read_breeding_settings(breeding_settings(experiment))
     assert body_space(settings.space) == types
 
 
@@ -246,7 +246,7 @@ def test_settings_and_text_round_trip() -> None:
 
 @pytest.mark.parametrize("settings", [b"", b"{}", b"[1]", b"\xff", b'{"space": 1}'])
 def test_malformed_settings(settings: bytes) -> None:
-    for read in (read_vetting_settings, read_evaluation_settings):
+    for read in (read_breeding_settings, read_evaluation_settings):
         with pytest.raises(ExperimentError, match="settings of a request: "):
             read(settings)
 

@@ -10,11 +10,11 @@ from schema.errors import ExperimentError, PluginDiffers, UnknownPlugin
 from schema.experiment.document import Fitness, body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import (
+    breeding_settings,
     evaluation_settings,
     fitness_function,
+    read_breeding_settings,
     read_evaluation_settings,
-    read_vetting_settings,
-    vetting_settings,
 )
 from schema.parts import BUILT_IN, PartType
 from schema.plugins import permission
@@ -87,9 +87,9 @@ def test_request_names_a_module_that_nobody_allowed(path: str) -> None:
     )
     with pytest.raises(UnknownPlugin, match=refusal):
         fitness_function(read_evaluation_settings(settings).fitness)
-    bodies = vetting_settings(document).replace(b"schema.parts:CORE", path.encode())
+    bodies = breeding_settings(document).replace(b"schema.parts:CORE", path.encode())
     with pytest.raises(UnknownPlugin, match=refusal):
-        body_space(read_vetting_settings(bodies).space)
+        body_space(read_breeding_settings(bodies).space)
 
 
 def test_settings_of_a_request_are_within_the_limits_of_an_experiment() -> None:

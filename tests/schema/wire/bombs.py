@@ -17,7 +17,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Advance, AdvanceShard, Changes, PastAdvance, Rebuild
 from schema.wire.codec import decode, encode
-from schema.wire.messages import Answer, Call, Request, Vet, Work
+from schema.wire.messages import Answer, Call, Evaluate, Request, Work
 from schema.wire.updates import Update
 
 Bomb = tuple[object, bytes, bytes]
@@ -53,14 +53,14 @@ def _history(removals: int) -> bytes:
 
 _MANY = _advance(history=(_PAST,)), encode((_PAST,))
 _CALL = _request(Call(encode([1.25])))
-_VET = _request(Vet(_BIRTH, 0, _ROBOT))
+_EVALUATION = _request(Evaluate(_BIRTH, _ROBOT))
 REFUSED: dict[str, Bomb] = {
     "removals": (_advance(_BIRTH), encode([_BIRTH]), encode(_BIRTH)),
     "lists for removals": (_advance(_BIRTH), encode([_BIRTH]), b"\x90"),
     "lists for a history": (*_MANY, b"\x90"),
     "lists for an argument": (_CALL, encode(encode([1.25])), b"\x90"),
     "judgements": (*_answer(), _judgement(0)),
-    "parts": (_VET, encode(_ROBOT.parts), encode(_ROBOT.parts[0])),
+    "parts": (_EVALUATION, encode(_ROBOT.parts), encode(_ROBOT.parts[0])),
     "lists for births": (
         Update("run", 1, 1, True, "x"),
         encode("births") + b"\x90",
@@ -71,7 +71,7 @@ REFUSED: dict[str, Bomb] = {
 DECODED: dict[str, Bomb] = {
     "history of removals": (*_MANY, _history(MOST_LIVING)),
     "long history": (*_MANY, _history(0)),
-    "parameters": (_VET, encode((1.25,)), b"\0"),
+    "parameters": (_EVALUATION, encode((1.25,)), b"\0"),
     "measures": (*_answer(), _judgement(MOST_MEASURES)),
 }
 """What the types allow."""

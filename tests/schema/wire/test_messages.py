@@ -17,7 +17,7 @@ from coordinator.islands.events import JournalledEvent
 from schema.errors import MalformedMessage
 from schema.limits import ANSWER_BYTES, LONGEST_REASON, MOST_EPOCH, UPDATE_BYTES
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Report
+from schema.robot.results import Evaluation
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import (
     Advance,
@@ -34,8 +34,10 @@ from schema.wire.messages import (
     OF_AGENTS,
     AgentInfo,
     Answer,
+    Bred,
     Call,
     Evaluate,
+    Newborn,
     Request,
     Result,
     Work,
@@ -72,7 +74,7 @@ ADVANCE = Advance(
     (Casualty(BIRTH, 7, "fell", (0.0, 0.0, 0.0)),),
     (Touch(BIRTH, BirthId(0, 4), 0.1),),
 )
-REPORT = Report(False, "no motor", ((1, 2),), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.3, 0)
+BRED = Bred(BIRTH, 0, ("no motor",), Newborn(b"genome", ROBOT, 3))
 COMMANDED = OperatorRequest("id", 2, InsertRobot(ROBOT, (0.0, -1.5)), "run")
 
 
@@ -137,8 +139,7 @@ def changed(message: object, path: str, value: object) -> bytes:
         (EVALUATED, "result.fitness"),
         (EVALUATED, "result.simulated_s"),
         (EVALUATED, "result.measures.0"),
-        (answer(REPORT), "result.mass"),
-        (answer(REPORT), "result.lower.1"),
+        (answer(BRED), "result.child.robot.0.0.5.0"),
         (answer(ADVANCE), "result.judgements.0.1"),
         (answer(ADVANCE), "result.judgements.0.4"),
         (answer(ADVANCE), "result.judgements.0.7.0"),
@@ -173,7 +174,8 @@ def test_numbers_are_finite(message: object, path: str, number: float) -> None:
         (EVALUATED, "result", {}, "type"),
         (EVALUATED, "result", None, "object"),
         (answer(ADVANCE), "result.digest", b"short", "32"),
-        (answer(REPORT), "result.lower", [0.0, 0.0], "length 3"),
+        (answer(BRED), "result.child.robot", [], "at least length 1"),
+        (answer(BRED), "result.child.connections", -1, ">= 0"),
         (COMMANDED, "request_id", "", "length >= 1"),
         (COMMANDED, "island", 2**32, "island"),
         (COMMANDED, "action", {"type": "pause", "island": 1}, "unknown field"),

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject
 from msgspec.structs import replace
 
-import analyzer.report
+import tests.analyzers
 from schema.agent.network import Agent
 from schema.agent.request_handler import Compute, Server
 from schema.errors import UnexpectedEvent
 from schema.experiment.identity import Origin
-from schema.experiment.settings import arena_settings, vetting_settings
+from schema.experiment.settings import arena_settings, breeding_settings
 from schema.limits import LONGEST_REASON, MOST_PARTS
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
@@ -20,7 +20,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, AdvanceShard, Changes, Insertion, Rebuild
 from schema.wire.codec import encode
-from schema.wire.messages import Request, Result, Vet
+from schema.wire.messages import Breed, Evaluate, Request, Result
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld
 from worker.serve.jobs import Jobs
@@ -30,7 +30,7 @@ EXPERIMENT = experiment(9)
 LAST = 10_000
 BIRTH = BirthId(0, 0)
 ROBOT = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
-VETTING = Request("r", 1, 2, Vet(BIRTH, 0, ROBOT), vetting_settings(EXPERIMENT))
+BREEDING = Request("r", 1, 2, Breed(BIRTH, 0, 5), breeding_settings(EXPERIMENT))
 ADVANCE = Request(
     "r",
     1,
@@ -66,8 +66,8 @@ def working(request: Request) -> Result:
 
 @pytest.mark.parametrize(
     ("compute", "valid"),
-    [(analyzer.report.answer, encode(VETTING)), (working, encode(ADVANCE))],
-    ids=["vetting", "advance"],
+    [(tests.analyzers.answer, encode(BREEDING)), (working, encode(ADVANCE))],
+    ids=["breeding", "advance"],
 )
 @settings(deadline=None)
 @given(data=st.data())
@@ -87,9 +87,9 @@ def test_mutated_requests_get_a_reply(
 
 def test_a_robot_of_too_many_parts_is_refused() -> None:
     parts = ROBOT.parts * (MOST_PARTS + 1)
-    made = server(analyzer.report.answer)
-    vetting = replace(VETTING, work=Vet(BIRTH, 0, Robot(parts)))
-    assert "length <= 1000 - at `$.work.robot" in made.reply(encode(vetting)).reason
+    made = server(working)
+    evaluation = replace(ADVANCE, work=Evaluate(BIRTH, Robot(parts)))
+    assert "length <= 1000 - at `$.work.robot" in made.reply(encode(evaluation)).reason
     assert made.counts.malformed == 1
 
 
@@ -98,6 +98,6 @@ def test_a_robot_of_too_many_parts_is_refused() -> None:
 )
 def test_settings_that_are_none_are_refused(sent: bytes) -> None:
     """Of the wrong type, and not UTF-8."""
-    for compute, request in ((analyzer.report.answer, VETTING), (working, ADVANCE)):
+    for compute, request in ((tests.analyzers.answer, BREEDING), (working, ADVANCE)):
         reply = server(compute).reply(encode(replace(request, settings=sent)))
         assert "settings of a request" in reply.reason

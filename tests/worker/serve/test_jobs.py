@@ -26,13 +26,13 @@ from schema.robot.ids import NOBODY
 from schema.robot.robot import Robot
 from schema.wire.calls import call_settings, pack_value, unpack_value
 from schema.wire.messages import (
+    Breed,
     Call,
     CallValue,
     Evaluate,
     Failure,
     Request,
     Result,
-    Vet,
     Work,
 )
 from worker.arena.world import World
@@ -77,8 +77,8 @@ def test_invalid_requests_are_rejected(turtle: Robot) -> None:
         Jobs(Shards(World)).answer(
             Request("run", 1, 1, Evaluate(NOBODY, turtle), b"{}")
         )
-    with pytest.raises(MalformedMessage, match="vets no bodies"):
-        result_of(turtle, work=Vet(NOBODY, 0, turtle))
+    with pytest.raises(MalformedMessage, match="breeds no robots"):
+        result_of(turtle, work=Breed(NOBODY, 0, 5))
 
 
 def test_unknown_measure_is_refused() -> None:

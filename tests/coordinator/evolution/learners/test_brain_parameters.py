@@ -5,17 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.learners.brain_parameters import BrainParameters
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import BrainSection, Experiment, body_space
 from schema.experiment.learning import Learning
 from schema.robot.brain import Brain, Connection, Neuron
-from schema.robot.genome import Node, develop, walk
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import with_brain
 from schema.robot.robot import Robot
+from schema.wire.genome_bytes import encode_genome
+from schema.wire.protobuf import decode_genome
+from tests.coordinator.breeding import candidate
 
 EXPERIMENT = Experiment(name="test")
 KINDS = neuron_kinds(EXPERIMENT.brain, EXPERIMENT.space)
@@ -62,27 +63,23 @@ def test_any_robot_keeps_what_it_learns_in_its_genome(brain: str) -> None:
     own = BrainParameters(Learning(), kinds)
     encoding, types = encoding_of(experiment), body_space(experiment.space)
     rng = np.random.default_rng(1)
-    breeder, dormant = Breeder(experiment, 1, 0), 0
-    parents = [breeder.candidate(BirthId(0, number), 0, ()) for number in range(6)]
-    population = [each.individual(0) for each in parents if each]
+    dormant = 0
+    parents = [candidate(experiment, BirthId(0, number)) for number in range(6)]
+    population = [each.individual(0) for each in parents]
     for number in range(6, 18):
-        found = breeder.candidate(BirthId(0, number), 0, population)
-        assert found is not None
-        genome = found.genome
-        assert isinstance(genome, Node)
+        found = candidate(experiment, BirthId(0, number), population)
         born = found.robot.brain
         assert own.written(born, own.read(born)).neurons != ()
         shares = tuple(rng.random(len(own.read(born))).tolist())
         learnt = Robot(found.robot.parts, own.written(born, shares))
         assert own.read(learnt.brain) == pytest.approx(shares, abs=1e-12)
         encoding.check(learnt)
-        new = encoding.with_brain(genome, learnt)
-        assert isinstance(new, Node)
-        assert develop(new, types) == learnt
+        new = encoding.with_brain(found.genome, learnt)
+        assert encoding.robot_of(new.genome) == new.robot == learnt
         # What the robot does not have stays.
-        assert with_brain(new, found.robot, types) == genome
-        genes = sum(len(node.connections) for node, _, _ in walk(new))
-        dormant += genes - len(born.connections)
+        old = with_brain(decode_genome(new.genome), found.robot, types)
+        assert encode_genome(old) == found.genome
+        dormant += new.connections - len(born.connections)
     # Networks have connections that lead nowhere after crossover; cpg removes them.
     assert (dormant > 0) == (brain == "network")
 
