@@ -39,7 +39,7 @@ demo: $(NEEDED)
 	echo; \
 	robustness=$$($(BIN)/revolve robot simulate $$run/best.yaml --robustness); \
 	printf 'best robot: '; echo "$$robustness" | tail -n 1; \
-	$(BIN)/revolve robot render $$run/best.yaml $$run/best.gif --size 480 --seconds 6; \
+	$(BIN)/revolve robot render $$run/best.yaml $$run/best.gif --size 480 --seconds 6 --trail --start-mark; \
 	$(BIN)/revolve analyze $$run --out $$run/report > $$run/report.txt \
 		|| { cat $$run/report.txt; exit 1; }; \
 	cp $$run/report/figures/*6.3*.png $$run/fitness.png; \

@@ -159,7 +159,7 @@ FIGURES: tuple[Figure, ...] = (
            "means, the dashed line is the thesis's fit for its own machine. Values "
            "above 1 are faster than real time.",
            (_BENCHMARK,), partial(speed, kind="arena"), "speed"),
-    _spread("fitness", "6.2", "Fitness at the end", {"fitness": "mean fitness"}),
+    _spread("fitness", "6.2", "Fitness at the end", {"fitness": "fitness"}),
     _course("fitness", "6.3", "Fitness over births", "fitness", "mean fitness"),
     _spread("diversity", "6.4", "Unique ancestors per robot of the last population",
             {"ancestors_per_robot": "unique ancestors per robot"}),

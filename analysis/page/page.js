@@ -332,6 +332,8 @@ function resize() {
   renderer.setSize(clientWidth, clientHeight, false);
   camera.aspect = clientWidth / clientHeight;
   camera.updateProjectionMatrix();
+  // A new size clears the canvas.
+  renderer.render(scene, camera);
 }
 
 function frame(clock_ms) {

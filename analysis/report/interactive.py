@@ -12,7 +12,7 @@ from typing import Any
 
 from analysis.figures.style import stored
 
-_DECIMALS = re.compile(r"(\.\d\d)\d+")
+_TAG, _DECIMALS = re.compile("<[^>]*>"), re.compile(r"(\.\d\d)\d+")
 
 
 def interactive(
@@ -35,7 +35,8 @@ def interactive(
     head, *groups = svg[svg.index("<defs>") :].split('<g id="')
     plain = re.sub(r"<metadata>.*?</metadata>", "", head, flags=re.DOTALL)
     content = plain + "".join(_group(each, texts) for each in groups)
-    short = _DECIMALS.sub(r"\1", content)
+    # Coordinates need no more decimals; texts keep theirs.
+    short = _TAG.sub(lambda tag: _DECIMALS.sub(r"\1", tag[0]), content)
     return (
         f'<svg class="{f"plot {kind}".strip()}" viewBox="{box}" role="img" '
         f'aria-label="{escape(description)}">{short}'

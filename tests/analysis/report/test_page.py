@@ -303,6 +303,7 @@ def test_texts_of_plots_are_those_of_their_marks_and_escaped() -> None:
     axes.plot([0, 1], [0, 1], gid="curve-0")
     axes.scatter([0, 1, 1], [1, 0, 1], gid="dots-1")
     axes.plot([0, 1], [1, 0])
+    axes.set_yticks([0.0, 0.025, 0.125])
     texts = {"curve-0": "<a> & b", "dots-1": ["one", "two", "three"]}
     drawn = interactive(figure, texts, '"d"')
     titles = re.findall("<title>(.*?)</title>", drawn)
@@ -310,6 +311,8 @@ def test_texts_of_plots_are_those_of_their_marks_and_escaped() -> None:
     assert re.findall('<g class="(.*?)"><title>', drawn) == ["curve"]
     assert drawn.count("<g><title>") == 3
     assert 'aria-label="&quot;d&quot;"' in drawn
+    for tick in ("0.000", "0.025", "0.125"):
+        assert f">{tick}</text>" in drawn
     # The next figure of a page has equal ids.
     assert re.findall('<g id="', drawn) == []
 
