@@ -8,8 +8,6 @@ from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 
-from msgspec import structs
-
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import KINDS, AgentKind, Deliver
 from coordinator.dispatch.fleet import JobRouter
@@ -295,10 +293,9 @@ def _runs_row(held: RunFolder) -> Record:
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = VERSION
-    details = structs.asdict(held.details)
-    del details["founders"]
+    own = held.details
     row = {
-        **details,
+        **{name: getattr(own, name) for name in ("name", "run", "seed", "document")},
         "state": "finished",
         "versions": json.dumps(versions),
         "platform": platform_tag(),

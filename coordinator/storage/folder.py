@@ -205,7 +205,7 @@ def holds_run(path: Path) -> bool:
 def read_details(path: Path) -> RunDetails:
     """Return the description of a folder's run, as ``read_description``."""
     found = read_description(path)
-    return RunDetails(found.name, found.run, found.seed, found.document, found.founders)
+    return RunDetails(*(getattr(found, name) for name in RunDetails.__struct_fields__))
 
 
 def refuse_other_version(path: Path) -> None:

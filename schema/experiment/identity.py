@@ -1,11 +1,12 @@
-"""Identity of an evaluation: the random draws of a worker depend on it."""
+"""Identity of an evaluation, which determines its draws; group of an archipelago."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
 from msgspec import Meta
 
-from schema.experiment.section import Count, Section
+from schema.experiment.section import AtLeastOne, Count, Section
 from schema.robot.ids import NOBODY, BirthId
 
 
@@ -41,3 +42,27 @@ class Identity:
 NO_ORIGIN = Origin()
 NO_IDENTITY = Identity(NO_ORIGIN, NOBODY, 0)
 """Identity outside of a run: of a robot file or a benchmark."""
+
+
+class Group(Section, frozen=True):
+    """Group of islands that one coordinator runs: those with number = i modulo ``of``.
+
+    Attributes:
+        number: of the group, from 0.
+        of: number of groups of the archipelago.
+    """
+
+    number: Count = 0
+    of: AtLeastOne = 1
+
+    def __str__(self) -> str:
+        """Return NUMBER/OF, as the flag ``--group`` has it."""
+        return f"{self.number}/{self.of}"
+
+    def islands(self, count: int) -> Sequence[int]:
+        """Return the numbers of the islands of the group, given how many there are."""
+        return range(self.number, count, self.of)
+
+
+WHOLE = Group()
+"""Group of a run that has all islands of its experiment."""

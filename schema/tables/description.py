@@ -13,7 +13,7 @@ from typing import Any, Literal
 import msgspec
 
 from schema.errors import RunFolderError, expectation, unreadable
-from schema.experiment.identity import Origin
+from schema.experiment.identity import WHOLE, Group, Origin
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
 from schema.plugins.kept import KeptPlugin, allow_kept
 
@@ -48,6 +48,9 @@ class RunDetails(msgspec.Struct, frozen=True):
         seed: random seed of the run or campaign.
         document: the experiment as JSON, with all defaults.
         founders: given founders, by the digests that the document holds.
+        group: islands of the document that the run has.
+        archipelago: name that the groups of an archipelago have in common; empty for a
+            run of all islands.
     """
 
     name: str
@@ -55,6 +58,8 @@ class RunDetails(msgspec.Struct, frozen=True):
     seed: int
     document: str
     founders: dict[str, KeptFounder] = {}
+    group: Group = WHOLE
+    archipelago: str = ""
 
     @property
     def origin(self) -> Origin:
@@ -178,6 +183,8 @@ def _fault(found: Description, data: bytes) -> str:
     for key, value, bits in (("run", found.run, 31), ("seed", found.seed, 64)):
         if not 0 <= value < 1 << bits:
             return f"{key} must be from 0 to 2^{bits} - 1, got {value}"
+    if found.group.number >= found.group.of:
+        return f"group must be one of {found.group.of}, got number {found.group.number}"
     return ""
 
 
