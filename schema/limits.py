@@ -48,6 +48,10 @@ UPDATE_BYTES = 64 * MIB
 """A message to viewers about a run, or its state, which travels in pages."""
 PAGE_BYTES = 32 * KIB
 """A page of a run's state; with its numbers, less than a connection sends at once."""
+MIGRANTS_REQUEST_BYTES = 1 * MIB
+"""A request of a coordinator for migrants from islands of another one."""
+MIGRANTS_BYTES = 64 * MIB
+"""The reply to it; what does not fit is in the next one."""
 OPERATOR_REQUEST_BYTES = 2 * MIB
 """A request of an operator; it may contain a robot."""
 OPERATOR_REPLY_BYTES = 16 * MIB

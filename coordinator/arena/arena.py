@@ -63,6 +63,7 @@ class Arena:
         step: physics step of the last decision.
         is_finished: all births of the experiment are done, or ``is_extinct``.
         is_extinct: no robot can be born any more, and none can arrive.
+        epochs: its migration; None without neighbours.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Arena:
         self.step = 0
         self.is_finished = self.is_extinct = False
         self.experiment = experiment
+        self.epochs = epochs
         self._end_s = arena.end_s
         self.clock = ArenaClock(experiment)
         self.encoding = encoding_of(experiment)

@@ -259,9 +259,7 @@ class LivingRobots:
             robot.individual = replace(
                 robot.individual,
                 fitness=judgement.fitness,
-                measures=MappingProxyType(
-                    dict(zip(self._labels, judgement.measures, strict=False))
-                ),
+                measures=dict(zip(self._labels, judgement.measures, strict=False)),
             )
 
     def sample(self, moment: Moment) -> list[Record]:

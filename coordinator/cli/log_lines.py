@@ -12,9 +12,13 @@ from coordinator.islands.events import (
     Asked,
     Audited,
     Commanded,
+    Immigrated,
     Insert,
     JournalledEvent,
+    MigrationEvent,
     Order,
+    Served,
+    source_of,
 )
 from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
@@ -35,6 +39,10 @@ _DETAILS = {
     "simulated_s": "{:.1f} s simulated",
     "parts": "parts {}",
     "failed": "failed: {}",
+    "source": "from island {}",
+    "epoch": "epoch {}",
+    "migrants": "migrants {}",
+    "group": "group {}",
     "advance": "advance {}",
     "order": "{}",
     "step": "step {}",
@@ -76,6 +84,9 @@ def describe(event: JournalledEvent, selection: EventFilter) -> list[Fields]:
     An advance has one line, or one for each selected robot in it.
     """
     birth: BirthId | None = None
+    if isinstance(event, Served):
+        fields = {"event": "served", "island": None, "group": event.group}
+        return [fields] if selection == EventFilter() else []
     if isinstance(event, Advanced):
         island = event.island
         if not selection.has(island, None):
@@ -87,6 +98,8 @@ def describe(event: JournalledEvent, selection: EventFilter) -> list[Fields]:
     elif isinstance(event, Audited):
         island, birth = requester_of(event.first), event.first.birth
         fields = _audit(event)
+    elif isinstance(event, MigrationEvent):
+        island, fields = event.island, _migration(event)
     else:
         island, birth = requester_of(event), event.birth
         fields = _answer(event)
@@ -125,6 +138,14 @@ def _bred(event: Bred) -> Fields:
     else:
         fields |= {"verdict": "viable", "parts": len(child.robot.parts)}
     return {**fields, "failed": [*event.reasons]} if event.reasons else fields
+
+
+def _migration(event: MigrationEvent) -> Fields:
+    fields: Fields = {"source": source_of(event)}
+    if isinstance(event, Immigrated):
+        migrants = [one.birth.name for one in event.migrants]
+        fields |= {"epoch": event.epoch, "migrants": migrants}
+    return fields
 
 
 def _audit(event: Audited) -> Fields:
@@ -199,7 +220,7 @@ def line(fields: Fields) -> str:
     return _LINE.format(
         fields["record"],
         fields["event"],
-        fields["island"],
+        "" if fields["island"] is None else fields["island"],
         fields.get("birth", ""),
         fields.get("attempt", fields.get("trial", "")),
         ", ".join(details).replace("\n", " "),

@@ -64,6 +64,7 @@ def execute_runs(
                 parts=deployment.arena_workers,
                 is_watched=is_watched and network is not None,
                 checks=deployment.checks,
+                migration=None if network is None else network.migration,
             ),
             most=_most_open_runs(),
             conclude=conclude,

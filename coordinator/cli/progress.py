@@ -14,6 +14,7 @@ from coordinator.cli.status_text import (
     about_arenas,
     best_text,
     births_done,
+    group_lines,
     missing_agents,
     pace,
     run_details,
@@ -125,6 +126,8 @@ class Display:
             self._warn(f"{line}{how if self._place else ''}")
         active = self._scheduler.active
         waiting = [line for run in active for line in _waiting(run, missing)]
+        for run in status.runs:
+            waiting += group_lines(run, only_silent=True)
         for line in waiting:
             if line not in self._shown_waiting:
                 self._warn(f"waiting: {line}")
@@ -176,7 +179,7 @@ def _rows(status: Status, notes: Sequence[str]) -> Iterator[tuple[str, Counted, 
     (run,) = status.runs
     details = f"{left}, {best_text(run.islands)}, {rates}{about_arenas(run)}"
     yield run.name, run, details
-    for number, island in enumerate(run.islands):
+    for number, island in run.numbered:
         if 1 < len(run.islands) <= MOST_BARS:
             yield f"  island {number}", island, best_text([island])
 

@@ -11,6 +11,7 @@ from msgspec import to_builtins
 
 from coordinator.cli.status_text import (
     births_done,
+    group_lines,
     missing_agents,
     pace,
     part_lines,
@@ -179,7 +180,8 @@ def show_source(source: Source) -> None:
         else:
             lines.append(waiting_text(missing_agents(status)))
     table = run_table(status, name_of, is_live=is_live)
-    show(*lines, *part_lines(status), *trouble_lines(status), table)
+    groups = [line for run in status.runs for line in group_lines(run)]
+    show(*lines, *part_lines(status), *groups, *trouble_lines(status), table)
 
 
 def _without_coordinator(status: Status, root: Path) -> str:

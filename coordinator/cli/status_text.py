@@ -7,6 +7,7 @@ from rich.table import Table
 
 from coordinator.dispatch.faults import MEANINGS
 from schema.errors import counted, rounded
+from schema.experiment.identity import Group
 from schema.limits import printable
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
@@ -104,7 +105,7 @@ def part_lines(status: Status) -> list[str]:
     """Return a line for each arena that several workers advance."""
     lines = []
     for run in status.runs:
-        for number, island in enumerate(run.islands):
+        for number, island in run.numbered:
             if island.parts:
                 parts = ", ".join(
                     f"{one.worker} {counted(one.robots, 'robot')} "
@@ -114,6 +115,29 @@ def part_lines(status: Status) -> list[str]:
                 again = counted(island.repeats, "repeated exchange")
                 lines.append(f"arena {number}: {parts}; {again}")
     return [printable(line, _WIDEST) for line in lines]
+
+
+def group_lines(run: RunStatus, *, only_silent: bool = False) -> list[str]:
+    """Return what a group of islands waits for: migrants, or groups that need them.
+
+    ``only_silent``: leave out groups that answer.
+    """
+    lines = []
+    for number in range(run.group.of):
+        other = Group(number=number, of=run.group.of)
+        is_silent = number in run.silent_groups
+        if only_silent and not is_silent:
+            continue
+        silence = ", which does not answer" * is_silent
+        lines += [
+            f"island {island} waits for island {each} of group {other}{silence}"
+            for island, status in run.numbered
+            for each in status.awaited
+            if each % run.group.of == number
+        ]
+        if run.state == "finished" and number in run.unserved_groups:
+            lines.append(f"finished; keeps its migrants for group {other}{silence}")
+    return [f"group {run.group}: {line}" for line in lines]
 
 
 def trouble_lines(status: Status) -> list[str]:

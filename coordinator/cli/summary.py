@@ -90,10 +90,12 @@ def _is_extinct(folder: Path, experiment: Experiment) -> bool:
     An arena with all births of the experiment is none, even if its last robots are
     too few to mate, and neither is one with robots at its ``end_s``.
     """
-    islands = island_experiments(experiment)
-    if not all(own.arena for own in islands):
-        return False
     births, names = births_of(folder), ["island", "sim_time_s"]
+    owns = island_experiments(experiment)
+    # A group of islands has no rows of the others.
+    islands = {number: owns[number] for number in births}
+    if not all(own.arena for own in islands.values()):
+        return False
     rows = [read_table(folder, table, names) for table in ("births", "fitness")]
     lived = pa.concat_tables(rows, promote_options="default").group_by("island")
     latest = lived.aggregate([("sim_time_s", "max")]).to_pylist()
@@ -102,7 +104,7 @@ def _is_extinct(folder: Path, experiment: Experiment) -> bool:
         (arena := own.arena) is not None
         and births[number] < own.births
         and not 0.0 < arena.end_s < last_s.get(number, 0.0) + arena.sample_interval_s
-        for number, own in enumerate(islands)
+        for number, own in islands.items()
     )
 
 

@@ -7,8 +7,9 @@ from typing import Literal
 from schema.limits import LONGEST_REASON, MOST_PEERS, printable
 
 FaultKind = Literal[
-    "malformed", "refused", "late", "foreign", "fenced", "cancelled", "death", "crowd"
-]
+    "malformed", "refused", "late", "foreign", "fenced", "cancelled", "death", "crowd",
+    "migrants",
+]  # fmt: skip
 
 MEANINGS: Mapping[FaultKind, str] = {
     "malformed": "malformed messages, dropped",
@@ -19,6 +20,7 @@ MEANINGS: Mapping[FaultKind, str] = {
     "cancelled": "jobs cancelled by another process",
     "death": "crashes reported that did not happen, dropped",
     "crowd": "tokens or queries beyond the limit, dropped",
+    "migrants": "migrants that cannot be those of the archipelago, dropped",
 }
 OTHERS = "other peers"
 

@@ -9,9 +9,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from types import MappingProxyType
+from typing import Annotated
 
-from msgspec import Struct
-from msgspec.structs import replace
+from msgspec import Meta, Struct
+from msgspec.structs import force_setattr, replace
 
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.founders import Founder
@@ -21,18 +22,25 @@ from coordinator.evolution.rules import Rule, rule_of, select_parents, select_su
 from coordinator.evolution.selection import cull_population
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment
+from schema.experiment.section import AtLeastOne, Count
+from schema.limits import LONGEST_NAME, MOST_MEASURES, MOST_PARTS, ROBOT_BYTES, Finite
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, failed_fitness
 from schema.robot.robot import Robot
+from schema.wire.codec import Message
 from schema.wire.messages import Bred, Breed
+from schema.wire.operator import MOST_PARENTS
 
 NO_MEASURES: Mapping[str, float] = MappingProxyType({})
 _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
 
 
-class Individual(Struct, frozen=True):
-    """Member of a population.
+_Measure = Annotated[str, Meta(max_length=LONGEST_NAME)]
+
+
+class Individual(Message, frozen=True):
+    """Member of a population; a migrant between coordinators travels as it is.
 
     Attributes:
         genome: bytes of what its children inherit.
@@ -49,15 +57,22 @@ class Individual(Struct, frozen=True):
     """
 
     birth: BirthId
-    genome: bytes
-    fitness: float
-    rank: int
-    generation: int | None
+    genome: Annotated[bytes, Meta(max_length=ROBOT_BYTES)]
+    fitness: Finite
+    rank: AtLeastOne
+    generation: Count | None
     has_failed: bool = False
-    parents: tuple[BirthId, ...] = ()
-    size: int = 0
-    measures: Mapping[str, float] = NO_MEASURES
+    parents: Annotated[tuple[BirthId, ...], Meta(max_length=MOST_PARENTS)] = ()
+    size: Annotated[int, Meta(ge=0, le=MOST_PARTS)] = 0
+    measures: Annotated[Mapping[_Measure, Finite], Meta(max_length=MOST_MEASURES)] = (
+        NO_MEASURES
+    )
     learnt: Robot | None = None
+
+    def __post_init__(self) -> None:
+        """Protect the measures from changes."""
+        if isinstance(self.measures, dict):
+            force_setattr(self, "measures", MappingProxyType(self.measures))
 
     def __hash__(self) -> int:
         """Return the hash of the birth id, as measures have none."""
@@ -76,9 +91,7 @@ class Individual(Struct, frozen=True):
             self,
             fitness=evaluation.fitness,
             has_failed=False,
-            measures=MappingProxyType(
-                dict(zip(labels, evaluation.measures, strict=True))
-            ),
+            measures=dict(zip(labels, evaluation.measures, strict=True)),
         )
 
     @property

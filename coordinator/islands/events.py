@@ -8,9 +8,10 @@ from typing import Any, ClassVar
 
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.learners.learner import Batch, Points
+from schema.experiment.section import Count
 from schema.limits import Finite, printable
 from schema.robot.brain import Brain
-from schema.robot.ids import BirthId
+from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.results import Evaluation, Provenance
 from schema.wire.arena import Advance, AdvanceShard
 from schema.wire.codec import Message
@@ -174,7 +175,7 @@ class Commanded(Message, frozen=True, tag=True):
     order: Order
 
 
-class Immigrated(Message, frozen=True):
+class Immigrated(Message, frozen=True, tag=True):
     """A neighbour's migrants of an epoch arrived (may be empty).
 
     Attributes:
@@ -182,23 +183,40 @@ class Immigrated(Message, frozen=True):
         source: the sending island.
         epoch: number of the epoch that ended there, from 0.
         migrants: individuals with their fitness at the source.
+        follows_closing: an island had finished before, and what it did not send has
+            influenced the source.
     """
 
-    island: int
-    source: int
-    epoch: int
+    island: IslandNumber
+    source: IslandNumber
+    epoch: Count
     migrants: tuple[Individual, ...]
+    follows_closing: bool = False
 
 
-class NeighbourClosed(Message, frozen=True):
+class NeighbourClosed(Message, frozen=True, tag=True):
     """A neighbour has finished and sends no more migrants."""
 
-    island: int
-    neighbour: int
+    island: IslandNumber
+    neighbour: IslandNumber
 
 
 MigrationEvent = Immigrated | NeighbourClosed
-"""Events that follow from other islands' commands; they are not journalled."""
+"""Events that follow from other islands' commands.
+
+They are journalled if the other island is of another group.
+"""
+
+
+def source_of(event: MigrationEvent) -> int:
+    """Return the island that an event comes from."""
+    return event.source if isinstance(event, Immigrated) else event.neighbour
+
+
+class Served(Message, frozen=True, tag=True):
+    """A group of islands needs no more migrants of this one."""
+
+    group: Count
 
 
 class Audited(Message, frozen=True, tag=True):
@@ -229,7 +247,7 @@ Answered = Bred | Outcome | Asked
 ExternalEvent = Answered | Advanced | Commanded
 """Journalled events that an island or an arena handles."""
 
-JournalledEvent = ExternalEvent | Audited
+JournalledEvent = ExternalEvent | MigrationEvent | Audited | Served
 """Events that the journal keeps: all that do not follow from other events."""
 
 IslandEvent = Started | Answered | MigrationEvent
@@ -281,12 +299,14 @@ class Emigrate(Message, frozen=True):
         to: the receiving island.
         epoch: number of the epoch that ended, from 0.
         migrants: individuals that are moved or copied.
+        follows_closing: as of ``Immigrated``.
     """
 
     island: int
     to: int
     epoch: int
     migrants: tuple[Individual, ...]
+    follows_closing: bool = False
 
 
 class Finish(Message, frozen=True):
@@ -294,6 +314,12 @@ class Finish(Message, frozen=True):
 
     island: int
     neighbours: tuple[int, ...] = ()
+
+
+def arrival(command: Emigrate) -> Immigrated:
+    """Return the event that a command is for the receiving island."""
+    sent, migrants = command, command.migrants
+    return Immigrated(sent.to, sent.island, sent.epoch, migrants, sent.follows_closing)
 
 
 IslandCommand = Breed | Evaluate | Ask | Record | Emigrate | Finish

@@ -74,6 +74,7 @@ class Island:
     Attributes:
         births: number of recorded births.
         population: living individuals, in birth order.
+        epochs: its migration; None without neighbours.
     """
 
     def __init__(
@@ -88,13 +89,13 @@ class Island:
     ) -> None:
         """Initialise an island, which has a number in its run, before its first event.
 
-        ``epochs`` are its migration, None without neighbours; ``given`` are founders of
-        the first births, of which the others are random.
+        ``given`` are founders of the first births, of which the others are random.
         """
         selection = experiment.selection
         self.births = 0
         self.population: tuple[Individual, ...] = ()
         self.experiment = experiment
+        self.epochs = epochs
         self._labels = experiment.measures.labels
         self._seed, self._run, self._number = seed, run, number
         self._encoding = encoding_of(experiment)

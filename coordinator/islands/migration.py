@@ -20,6 +20,7 @@ from coordinator.islands.events import (
     Immigrated,
     MigrationEvent,
     NeighbourClosed,
+    source_of,
 )
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
@@ -54,6 +55,7 @@ class MigrationEpochs:
         epoch: number of the epoch, from 0.
         is_waiting: it has sent its migrants and awaits those of its neighbours.
         emigrants: own rule that selects them, which its island makes, if any.
+        next_epochs: epoch whose migrants come next, of each open neighbour.
     """
 
     def __init__(
@@ -76,9 +78,10 @@ class MigrationEpochs:
         self._stream = partial(stream, seed, run)
         self._due_births = migration.epoch
         self._due_s = inf if migration.epoch_s is None else migration.epoch_s
-        self._inbox: dict[tuple[int, int], tuple[Individual, ...]] = {}
-        self._next_epochs = dict.fromkeys(links.neighbours, 0)
+        self._inbox: dict[tuple[int, int], Immigrated] = {}
+        self.next_epochs = dict.fromkeys(links.neighbours, 0)
         self._active = links.neighbours
+        self._follows_closing = False
 
     def is_due(self, births: int, now_s: float = -inf) -> bool:
         """Return whether the epoch ends now; arenas give their simulated time [s]."""
@@ -92,9 +95,13 @@ class MigrationEpochs:
     @property
     def is_complete(self) -> bool:
         """It is waiting, and all open neighbours have sent their migrants."""
-        return self.is_waiting and all(
-            following > self.epoch for following in self._next_epochs.values()
-        )
+        return self.is_waiting and not self.missing
+
+    @property
+    def missing(self) -> list[int]:
+        """Neighbours whose migrants of this epoch have not arrived."""
+        following = self.next_epochs.items()
+        return [each for each, epoch in following if epoch <= self.epoch]
 
     def send(
         self, candidates: Sequence[Individual], living: int, spare: int
@@ -119,7 +126,13 @@ class MigrationEpochs:
             for place, to in enumerate(targets)
         }
         sent = [
-            Emigrate(self.island, to, self.epoch, tuple(shares.get(to, ())))
+            Emigrate(
+                self.island,
+                to,
+                self.epoch,
+                tuple(shares.get(to, ())),
+                self._follows_closing,
+            )
             for to in self._active
         ]
         return sent, chosen if is_moved and targets else []
@@ -130,23 +143,23 @@ class MigrationEpochs:
         Raises:
             UnexpectedEvent: it comes from no open neighbour, or not in order.
         """
-        source = event.source if isinstance(event, Immigrated) else event.neighbour
-        expected = self._next_epochs.get(source)
+        source = source_of(event)
+        expected = self.next_epochs.get(source)
         if event.island != self.island or expected is None:
             raise UnexpectedEvent(
-                f"island {self.island} has open neighbours {list(self._next_epochs)}, "
+                f"island {self.island} has open neighbours {list(self.next_epochs)}, "
                 f"got {event}"
             )
         if isinstance(event, NeighbourClosed):
-            del self._next_epochs[source]
+            del self.next_epochs[source]
             return
         if event.epoch != expected:
             raise UnexpectedEvent(
                 f"island {self.island}: epoch {expected} of {source} is next, "
                 f"got {event}"
             )
-        self._next_epochs[source] = expected + 1
-        self._inbox[source, event.epoch] = event.migrants
+        self.next_epochs[source] = expected + 1
+        self._inbox[source, event.epoch] = event
 
     def receive(
         self, known: Collection[BirthId], births: int, now_s: float = -inf
@@ -162,10 +175,13 @@ class MigrationEpochs:
             is_reevaluated = (
                 self._migration.judge_anew or source in self.links.differing
             )
-            for one in self._inbox.pop((source, self.epoch)):
+            event = self._inbox.pop((source, self.epoch))
+            self._follows_closing |= event.follows_closing
+            for one in event.migrants:
                 if one.birth not in known:
                     arrivals.setdefault(one.birth, (one, is_reevaluated))
         # Not the neighbours that are open now: that would depend on their speed.
+        self._follows_closing |= len(senders) < len(self._active)
         self._active = tuple(senders)
         self.epoch += 1
         self.is_waiting = False

@@ -21,6 +21,7 @@ from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
 from coordinator.network.hub_service import watch_unlisted
 from coordinator.network.membership import InfoQueue, Membership
+from coordinator.network.migration_service import MigrationService
 from coordinator.network.operator_service import Queries
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
@@ -232,6 +233,10 @@ class Network:
         ]
         self._outlet.lead_to(self._session)
         self._token = self._session.liveliness().declare_token(self._me.alive)
+
+    def migration(self) -> MigrationService:
+        """Open the connection to coordinators of other groups of islands."""
+        return MigrationService(self._session, self._me, self.wake, self.faults)
 
     def _enqueue(self, key: str) -> "zenoh.handlers.Callback[zenoh.Query]":
         """Return a callback for the queries of a key; they may have wildcards."""

@@ -8,6 +8,7 @@ from coordinator.islands.island import Island
 from coordinator.islands.migration import MigrationEpochs, Neighbours
 from coordinator.islands.topology import Edge, connections
 from schema.experiment.document import Experiment, island_experiments
+from schema.experiment.identity import WHOLE, Group
 from schema.experiment.settings import evaluation_settings
 from schema.tables.description import KeptFounder
 
@@ -17,8 +18,9 @@ def archipelago(
     seed: int,
     run: int,
     founders: Mapping[str, KeptFounder] | None = None,
+    group: Group = WHOLE,
 ) -> dict[int, Island | Arena]:
-    """Return the islands by number, before their first event.
+    """Return the islands of a group by number, before their first event.
 
     ``founders``: the given ones that the experiment names, by digest.
 
@@ -32,7 +34,8 @@ def archipelago(
     # Islands that differ in these evaluate robots differently.
     worlds = [(own.arena is None, evaluation_settings(own)) for own in owns]
     islands: dict[int, Island | Arena] = {}
-    for number, own in enumerate(owns):
+    for number in group.islands(len(owns)):
+        own = owns[number]
         links, epochs = _neighbours(number, worlds, edges), None
         if own.migration is not None and links.neighbours:
             epochs = MigrationEpochs(own, number, links, seed, run)

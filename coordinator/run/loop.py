@@ -13,6 +13,7 @@ from itertools import chain
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import Deliver
 from coordinator.dispatch.fleet import JobRouter
+from coordinator.groups.outbox import Outbox
 from coordinator.islands.events import (
     Advanced,
     Answered,
@@ -33,7 +34,9 @@ from coordinator.islands.events import (
     NeighbourClosed,
     Outcome,
     Record,
+    Served,
     Started,
+    arrival,
     brief,
 )
 from coordinator.islands.island import Island
@@ -70,7 +73,8 @@ class Loop:
     """The islands of a run and their connection to agents, journal and tables.
 
     Attributes:
-        islands: the state machines of the islands, by number.
+        islands: the state machines of the islands here, by number.
+        outbox: migrants for islands of other groups.
         log: the journal; None if events of it are only repeated.
         rows: the tables; None if nothing is to be written.
         snapshot_store: the snapshots of arenas.
@@ -104,6 +108,7 @@ class Loop:
         )
         self._requests = Requests(context, fleet, self.checks)
         self._learners = Learners(context.experiments, context.origin)
+        self.outbox = Outbox()
         self._now_s = 0.0
         self._recent: deque[Event | str] = deque(maxlen=_RECENT)
         self._unanswered: dict[Key, Breed | Evaluate | Ask] = {}
@@ -156,6 +161,8 @@ class Loop:
         if isinstance(event, Audited | Answered):
             answer = event.first if isinstance(event, Audited) else event
             return self._unanswered.get(key_of(answer))
+        if isinstance(event, Immigrated | NeighbourClosed | Served):
+            return None
         requested = self.shard_requests.requested(event.island)
         if isinstance(event, Advanced):
             is_it = requested is not None and requested.number == event.number
@@ -212,6 +219,14 @@ class Loop:
             raise UnexpectedEvent(f"no arena {event.island}: {event}")
         self._take([event])
 
+    def receive(self, events: Sequence[MigrationEvent | Served]) -> None:
+        """Take what other groups of islands sent; the journal has it on return.
+
+        Raises:
+            ExperimentError, RunFolderError, RunPaused: as of ``act``.
+        """
+        self._take(events)
+
     def _take(self, events: Sequence[JournalledEvent]) -> None:
         """Store events, then act on them, and on the answers of learners."""
         while events:
@@ -236,6 +251,9 @@ class Loop:
 
     def _act_on(self, event: JournalledEvent) -> list[Request]:
         """Act on an event that the journal holds; return the requests to send."""
+        if isinstance(event, Served):
+            self.outbox.served.add(event.group)
+            return []
         if not isinstance(event, Audited):
             return self._tell(island_of(event), event)
         for record in audit_records(event):
@@ -269,7 +287,7 @@ class Loop:
                 return
         self.shard_requests.send(command)
 
-    def _tell(self, number: int, first: Started | ExternalEvent) -> list[Request]:
+    def _tell(self, number: int, first: Event) -> list[Request]:
         """Deliver an event, carry out the commands, return the requests to send.
 
         Raises:
@@ -294,13 +312,20 @@ class Loop:
                         self.rows.append(advanced)
                     case Breed() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
-                    case Emigrate(island, to, epoch, migrants):
-                        events.append((to, Immigrated(to, island, epoch, migrants)))
+                    case Emigrate():
+                        events += self._sent(arrival(command))
                     case Finish(island, neighbours):
                         self.shard_requests.keep_snapshots()
                         for to in neighbours:
-                            events.append((to, NeighbourClosed(to, island)))
+                            events += self._sent(NeighbourClosed(to, island))
         return requests
+
+    def _sent(self, event: MigrationEvent) -> list[tuple[int, Event]]:
+        """Return an event with the island here that it is for; keep it for others."""
+        if event.island in self.islands:
+            return [(event.island, event)]
+        self.outbox.put(event)
+        return []
 
     def _write(self, record: Record) -> None:
         if self.rows is not None:

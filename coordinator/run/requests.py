@@ -24,6 +24,7 @@ from coordinator.islands.events import (
     Evaluated,
     EvaluationFailed,
     ExternalEvent,
+    MigrationEvent,
 )
 from coordinator.run.cross_checks import NO_CHECKS, Checks, CrossChecks
 from coordinator.run.run_context import RunContext
@@ -147,9 +148,9 @@ def requester_of(about: Breed | Evaluate | Ask | Answered) -> int:
     return about.birth.island if about.requester is None else about.requester
 
 
-def island_of(event: ExternalEvent) -> int:
+def island_of(event: ExternalEvent | MigrationEvent) -> int:
     """Return the number of the island that an event is for."""
-    if isinstance(event, Advanced | Commanded):
+    if isinstance(event, Advanced | Commanded | MigrationEvent):
         return event.island
     return requester_of(event)
 

@@ -96,9 +96,9 @@ class RunScheduler:
         now_s = clock()
         acting: dict[RunSession, list[Deliver]] = {}
         for run in self._places:
-            if (throttle := run.loop.throttle) is not None:
+            if (wake_s := run.wake_s) is not None:
                 acting[run] = []
-                timeout_s = min(timeout_s, max(0.0, throttle.wake_s - now_s))
+                timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         for client, ends in self.fleet.listen(timeout_s, now_s).items():
             if client in self._run_of:
                 acting[self._run_of[client]] = ends
@@ -106,10 +106,7 @@ class RunScheduler:
         now_s = clock()
         for run, ends in acting.items():
             if run in self._places:
-                # A run that has lost poses computes them before its loop starts.
-                is_ready = run.recovery is None
-                act = partial(run.loop.act, now_s) if is_ready else run.recover
-                self.guard(run, partial(act, ends))
+                self.guard(run, partial(run.act, now_s, ends))
 
     def _check_fenced(self) -> None:
         """Stop the runs that another coordinator took over, as agents say.
@@ -145,14 +142,13 @@ class RunScheduler:
         """Let a run act; an error ends this run only."""
         try:
             act()
-            if run.loop.is_finished:
-                run.finish()
+            if run.finish():
                 self.conclude(run)
         except RevolveError as error:
             self._fail(self._places[run], _cause(run, error))
             self._dismiss(run)
             return
-        if run.loop.is_finished:
+        if run.is_done:
             self._known[self._places[run]] = replace(run.status(0.0), births_per_s=0.0)
             self._dismiss(run)
 

@@ -2,7 +2,7 @@
 
 import json
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib import metadata
@@ -13,9 +13,11 @@ from coordinator.dispatch.events import KINDS, AgentKind, Deliver
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
+from coordinator.network.migration_service import MigrationService
 from coordinator.run.archipelago import archipelago
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.feed import Feed
+from coordinator.run.group_link import GroupLink
 from coordinator.run.loop import Loop
 from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
@@ -28,7 +30,7 @@ from coordinator.storage.snapshots import Snapshots
 from schema.agent.log import warn_user
 from schema.agent.machine import cpu_flags, platform_tag
 from schema.agent.version import VERSION
-from schema.errors import RunFolderError
+from schema.errors import NetworkError, RunFolderError
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
 from schema.tables.description import DETAILS, STATE
@@ -70,6 +72,7 @@ class RunSession:
         feed: collects its rows for viewers; None without a network.
         recovery: computes lost poses before the run continues; None: nothing is lost,
             so that the loop acts on the ends of jobs and advances.
+        link: to the other groups of islands, if this run is one.
     """
 
     def __init__(
@@ -82,20 +85,25 @@ class RunSession:
         parts: int | None = None,
         is_watched: bool = False,
         checks: Checks = NO_CHECKS,
+        migration: Callable[[], MigrationService] | None = None,
     ) -> None:
         """Open the files of a run; ``start`` starts it.
 
         ``held``: the folder; closed with the run, or at once if this fails. ``fsync``:
         survive power loss, too. ``speed``: simulated seconds per second at most, of
         arenas; None: no limit. ``parts``: of an arena; None: as many as pay.
+        ``migration``: connects to other groups of islands; None: no network.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
+            NetworkError: a group of islands without a network.
         """
         self.held = held
         details = held.details
         with ExitStack() as stack:
             stack.callback(held.close)
+            if details.group.of > 1 and migration is None:
+                raise NetworkError(f"{held.path}: a group of islands needs the network")
             check_journal(held.path)
             self._journal = stack.enter_context(
                 Journal.open(held.path, epoch=held.epoch, fsync=fsync)
@@ -117,7 +125,11 @@ class RunSession:
             )
             self.loop = Loop(
                 archipelago(
-                    self.experiment, details.seed, details.run, details.founders
+                    self.experiment,
+                    details.seed,
+                    details.run,
+                    details.founders,
+                    details.group,
                 ),
                 context=self._context,
                 fleet=fleet,
@@ -130,6 +142,12 @@ class RunSession:
                 confirm=held.confirm,
                 watch=self.feed.unread.append if self.feed else None,
             )
+            self.link = (
+                GroupLink(details, self.loop, migration(), fleet.faults)
+                if details.group.of > 1 and migration is not None
+                else None
+            )
+            self._is_sealed = False
             self._births, self._simulated = RateMeter(), RateMeter()
             self._opened = stack.pop_all()
 
@@ -163,7 +181,22 @@ class RunSession:
         )
         self.recovery.start()
 
-    def recover(self, ends: Iterable[Deliver]) -> None:
+    def act(self, now_s: float, ends: Iterable[Deliver]) -> None:
+        """Act on the ends of jobs, and on what other groups of islands have sent.
+
+        A run that has lost poses computes them before its loop starts.
+
+        Raises:
+            RevolveError: the run cannot continue; see ``Loop.act``.
+        """
+        if self.recovery is not None:
+            self._go_on_recovering(ends)
+            return
+        self.loop.act(now_s, ends)
+        if self.link is not None:
+            self.link.act(now_s)
+
+    def _go_on_recovering(self, ends: Iterable[Deliver]) -> None:
         """Continue the recovery of lost poses; when it is done, start the loop.
 
         Raises:
@@ -194,16 +227,27 @@ class RunSession:
         self.held.confirm()
         self._recorder.flush()
 
-    def finish(self) -> None:
-        """Write the last row, and convert all tables to their final form.
+    @property
+    def is_done(self) -> bool:
+        """It is finished, and no other group of islands needs its migrants."""
+        return self._is_sealed and (self.link is None or self.link.is_done)
+
+    def finish(self) -> bool:
+        """Write the last row and the final form of all tables if all births are done.
+
+        Return whether it has finished now.
 
         Raises:
             RunFolderError: another process owns the folder, or the disk failed.
         """
+        if self._is_sealed or not self.loop.is_finished:
+            return False
         self.held.confirm()
         self._recorder.write(_runs_row(self.held))
         self._recorder.finish()
         self.held.set_state("finished")
+        self._is_sealed = True
+        return True
 
     def stop(self) -> None:
         """Flush everything, so that the run can be resumed.
@@ -212,12 +256,19 @@ class RunSession:
             RunFolderError: another process owns the folder, or the disk failed.
         """
         self.do_chores()
-        self.held.set_state("stopped")
+        if not self._is_sealed:
+            self.held.set_state("stopped")
 
     def close(self) -> None:
         """Drop open requests; close the folder and all files."""
         self.loop.leave()
         self._opened.close()
+
+    @property
+    def wake_s(self) -> float | None:
+        """When it has something to do by itself [s]; None: never."""
+        timed = [self.loop.throttle, None if self.recovery else self.link]
+        return min((each.wake_s for each in timed if each), default=None)
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -257,6 +308,9 @@ class RunSession:
             births_per_s=self._births.per_s,
             islands=islands,
             simulated_per_s=self._simulated.per_s,
+            group=details.group,
+            silent_groups=self.link.exchange.silent if self.link else (),
+            unserved_groups=self.link.exchange.unserved if self.link else (),
         )
 
     def _island_status(self, number: int, island: Island | Arena) -> IslandStatus:
@@ -271,7 +325,15 @@ class RunSession:
             is_paused=bool(arena and arena.is_paused),
             parts=parts,
             repeats=repeats,
+            awaited=self._awaited(island),
         )
+
+    def _awaited(self, island: Island | Arena) -> tuple[int, ...]:
+        """Return the islands of other groups whose migrants an island waits for."""
+        if self.link is None or island.epochs is None or not island.epochs.is_waiting:
+            return ()
+        missing = island.epochs.missing
+        return tuple(each for each in missing if each not in self.loop.islands)
 
 
 def check_journal(folder: Path) -> None:

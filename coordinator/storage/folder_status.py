@@ -63,7 +63,7 @@ def folder_status(folder: Path) -> RunStatus:
             best=newest.get(number, {}).get("fitness_max"),
             alive=newest.get(number, {}).get("count_all", 0),
         )
-        for number, island in enumerate(status.islands)
+        for number, island in status.numbered
     )
     return replace(status, state=state, islands=islands)
 
@@ -146,8 +146,10 @@ def check_rewritable(folder: Path) -> None:
 def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:
     """Return the status of a run that has not started."""
     experiment = experiment_from_text(details.document)
+    owns, group = island_experiments(experiment), details.group
     islands = tuple(
-        IslandStatus(0, own.births, None, 0) for own in island_experiments(experiment)
+        IslandStatus(0, owns[number].births, None, 0)
+        for number in group.islands(len(owns))
     )
-    where = str(folder.resolve())
-    return RunStatus(where, details.name, details.run, "waiting", islands=islands)
+    where, name = str(folder.resolve()), details.name
+    return RunStatus(where, name, details.run, "waiting", islands=islands, group=group)

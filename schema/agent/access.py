@@ -78,6 +78,10 @@ def permissions(certificate: Certificate) -> list[Permission]:
         ]
     if certificate.role == "coordinator":
         own = f"revolve/*/co/{name}.$*/**"
+        migrants, announced = (
+            (f"{coordinators}/migrants",),
+            (f"{coordinators}/announced",),
+        )
         return [
             Permission("ingress", (*_OWN, "declare_subscriber"), (own,)),
             Permission("ingress", _WATCH, tuple(f"{each}/alive" for each in agents)),
@@ -91,6 +95,11 @@ def permissions(certificate: Certificate) -> list[Permission]:
             ),
             Permission("egress", _SERVE, ("revolve/*/w/**", "revolve/*/an/**")),
             Permission("egress", ("query", "put", "delete"), (own,)),
+            # Groups of islands: any coordinator may ask, and decides whom it answers.
+            Permission("ingress", ("query",), migrants),
+            Permission("egress", ("query", "reply", "declare_queryable"), migrants),
+            Permission("ingress", ("declare_subscriber",), announced),
+            Permission("egress", ("put",), announced),
             Permission("egress", ("declare_subscriber",), (f"{coordinators}/**",)),
             watch,
             see,

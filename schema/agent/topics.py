@@ -19,7 +19,10 @@ Role = Literal["worker", "analyzer", "coordinator"]
 
 _CHUNKS: dict[Role, str] = {"worker": "w", "analyzer": "an", "coordinator": "co"}
 _ROLES: dict[str, Role] = {chunk: role for role, chunk in _CHUNKS.items()}
-KEYS = ("jobs", "alive", "info", "cancelled", "command", "state", "events", "trial")
+KEYS = (
+    *("jobs", "alive", "info", "cancelled", "command", "state", "events", "trial"),
+    *("migrants", "announced"),
+)
 """Attributes of a member that are keys, by their last word."""
 # No key separator, no wildcard, no leading "@", which the engine reserves.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
@@ -43,6 +46,9 @@ class Member:
         state: key that gives viewers an ``Update`` of everything since the beginning.
         events: key on which an ``Update`` appears when something has happened.
         trial: key on which ``revolve doctor`` tries the rights of a certificate.
+        migrants: key that takes one ``MigrantsRequest`` of a coordinator that runs
+            another group of islands, and gives the reply.
+        announced: key on which a ``GroupNews`` appears when islands have sent migrants.
     """
 
     fleet: str
@@ -57,6 +63,8 @@ class Member:
     state: str = field(init=False, compare=False)
     events: str = field(init=False, compare=False)
     trial: str = field(init=False, compare=False)
+    migrants: str = field(init=False, compare=False)
+    announced: str = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         # Once per process and not for each job.
@@ -83,6 +91,16 @@ def agents_alive(fleet: str, role: Role) -> str:
 def poses_of_all(fleet: str) -> str:
     """Return the key expression of ``Member.poses`` of all workers."""
     return f"revolve/{fleet}/{_CHUNKS['worker']}/*/arena/*/pose"
+
+
+def migrants_of_all(fleet: str) -> str:
+    """Return the key expression of ``Member.migrants`` of all coordinators."""
+    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/migrants"
+
+
+def announced_by_all(fleet: str) -> str:
+    """Return the key expression of ``Member.announced`` of all coordinators."""
+    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/announced"
 
 
 def news_of_all(fleet: str) -> str:

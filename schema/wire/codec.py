@@ -7,7 +7,7 @@ long are refused. A decoded message takes at most some fifty times its bytes.
 
 from functools import cache
 from hashlib import blake2b
-from types import UnionType
+from types import MappingProxyType, UnionType
 from typing import Any, TypeVar, cast, overload
 
 from msgspec import Struct, inspect, msgpack
@@ -17,7 +17,15 @@ from schema.errors import MalformedMessage
 
 T = TypeVar("T")
 
-encode = msgpack.encode
+
+def _plain(value: object) -> dict[Any, Any]:
+    """Return what is encoded in place of an object that MessagePack does not know."""
+    if isinstance(value, MappingProxyType):
+        return dict(value)
+    raise TypeError(f"cannot encode {type(value).__name__}")
+
+
+encode = msgpack.Encoder(enc_hook=_plain).encode
 """Return the bytes of a message."""
 
 

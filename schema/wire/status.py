@@ -1,12 +1,15 @@
 """Progress of runs, as a coordinator reports it or a run folder shows it."""
 
 from collections.abc import Iterable
+from itertools import count
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
 
+from schema.experiment.identity import WHOLE, Group
 from schema.experiment.section import Count
 from schema.limits import MOST_SHOWN, Finite
+from schema.robot.ids import IslandNumber
 from schema.wire.codec import Message
 
 
@@ -39,6 +42,7 @@ class IslandStatus(Message, frozen=True):
         parts: of an arena that several workers advance.
         repeats: number of exchanges between these after which robots were advanced
             again, because those of two parts came near each other.
+        awaited: islands of other groups whose migrants it waits for.
     """
 
     births: Count
@@ -49,6 +53,7 @@ class IslandStatus(Message, frozen=True):
     is_paused: bool = False
     parts: tuple[PartStatus, ...] = ()
     repeats: Count = 0
+    awaited: tuple[IslandNumber, ...] = ()
 
 
 class RunStatus(Message, frozen=True):
@@ -60,8 +65,11 @@ class RunStatus(Message, frozen=True):
         run: number of the repeat.
         state: "waiting", "running", "stopped", "finished", "failed" or "damaged".
         births_per_s: recent rate [1/s].
-        islands: by island number; empty if nothing is known about them yet.
+        islands: of its group, by island number; empty if nothing is known about them.
         simulated_per_s: recent simulated seconds per second, of all arenas together.
+        group: of islands, which the run has.
+        silent_groups: those that do not answer.
+        unserved_groups: those that may need migrants of this one.
     """
 
     folder: str
@@ -71,6 +79,14 @@ class RunStatus(Message, frozen=True):
     births_per_s: Finite = 0.0
     islands: tuple[IslandStatus, ...] = ()
     simulated_per_s: Finite = 0.0
+    group: Group = WHOLE
+    silent_groups: tuple[Count, ...] = ()
+    unserved_groups: tuple[Count, ...] = ()
+
+    @property
+    def numbered(self) -> Iterable[tuple[int, IslandStatus]]:
+        """Its islands with their numbers."""
+        return zip(count(self.group.number, self.group.of), self.islands, strict=False)
 
     @property
     def births(self) -> int:

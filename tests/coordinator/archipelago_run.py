@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 
 from coordinator.arena.arena import Arena
+from coordinator.groups.outbox import Outbox
 from coordinator.islands.events import (
     ArenaCommand,
     Ask,
     Emigrate,
     Evaluated,
     Finish,
-    Immigrated,
     IslandCommand,
     NeighbourClosed,
     Record,
     Started,
+    arrival,
 )
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
@@ -32,7 +33,7 @@ from schema.experiment.document import (
     Simulation,
     island_experiment,
 )
-from schema.experiment.identity import Origin
+from schema.experiment.identity import WHOLE, Group, Origin
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
@@ -70,7 +71,7 @@ Robots mature 15 s after they were dropped.
 
 @dataclass
 class ArchipelagoRun:
-    """An archipelago and all commands of its islands.
+    """An archipelago, or a group of its islands, and all commands of these.
 
     Attributes:
         order: how far to rotate the open requests before each answer.
@@ -86,6 +87,8 @@ class ArchipelagoRun:
     verdict: WhyNot = viable
     slow: tuple[int, ...] = ()
     founders: Mapping[str, KeptFounder] | None = None
+    group: Group = WHOLE
+    outbox: Outbox = field(default_factory=Outbox)
     islands: dict[int, Island | Arena] = field(default_factory=dict)
     worlds: dict[int, World] = field(default_factory=dict)
     commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
@@ -97,7 +100,9 @@ class ArchipelagoRun:
 
     def __post_init__(self) -> None:
         """Make the islands."""
-        self.islands = archipelago(self.experiment, self.seed, self.run, self.founders)
+        self.islands = archipelago(
+            self.experiment, self.seed, self.run, self.founders, self.group
+        )
         self.worlds = {number: World(distinct_fitness) for number in self.islands}
         self.commands = {number: [] for number in self.islands}
         own = {each: island_experiment(self.experiment, each) for each in self.islands}
@@ -151,12 +156,18 @@ class ArchipelagoRun:
                 match command:
                     case Breed() | Evaluate() | Ask() | AdvanceShard():
                         self.waiting.append((number, command))
-                    case Emigrate(island, to, epoch, migrants):
-                        events.append((to, Immigrated(to, island, epoch, migrants)))
+                        continue
+                    case Emigrate():
+                        sent = [arrival(command)]
                     case Finish(island, neighbours):
-                        events += [
-                            (to, NeighbourClosed(to, island)) for to in neighbours
-                        ]
+                        sent = [NeighbourClosed(to, island) for to in neighbours]
+                    case _:
+                        continue
+                for each in sent:
+                    if each.island in self.islands:
+                        events.append((each.island, each))
+                    else:
+                        self.outbox.put(each)
 
     def rows(self, table: str) -> list[Any]:
         """Return the rows of a table, island by island."""

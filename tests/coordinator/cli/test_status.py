@@ -4,12 +4,14 @@ import json
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.cli.status import Source, main, show_source, status_json
-from coordinator.cli.status_text import fault_lines, part_lines, state_of
+from coordinator.cli.status_text import fault_lines, group_lines, part_lines, state_of
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
+from schema.experiment.identity import Group
 from schema.tables.description import RunDetails
 from schema.wire.status import (
     IslandStatus,
@@ -84,10 +86,11 @@ def test_the_document_has_these_keys_and_values() -> None:
     assert half == {
         "folder": "/x/half", "name": "scenario1", "run": 1, "state": "running",
         "births": 10, "wanted": 20, "left_s": 20.0, "births_per_s": 0.5,
-        "simulated_per_s": 3.0,
+        "simulated_per_s": 3.0, "group": {"number": 0, "of": 1},
+        "silent_groups": [], "unserved_groups": [],
         "islands": [
             {**island, "simulated_s": None, "is_paused": False, "parts": [],
-             "repeats": 0}
+             "repeats": 0, "awaited": []}
         ],
     }  # fmt: skip
     assert (done["state"], done["left_s"]) == ("finished", 0.0)
@@ -103,6 +106,24 @@ def test_an_arena_in_parts_has_a_line() -> None:
         "arena 0: w0 1 robot (25% of the cost, 0 came), "
         "w1 9 robots (75% of the cost, 3 came); 1 repeated exchange"
     )
+
+
+def test_a_group_of_islands_says_what_it_waits_for() -> None:
+    islands = (IslandStatus(10, 20, None, 10, awaited=(0, 2)),)
+    half = RunStatus(
+        "/x/a", "ring", 0, "running", islands=islands, group=Group(number=1, of=3),
+        silent_groups=(2,), unserved_groups=(0, 2),
+    )  # fmt: skip
+    first = "group 1/3: island 1 waits for island 0 of group 0/3"
+    second = (
+        "group 1/3: island 1 waits for island 2 of group 2/3, which does not answer"
+    )
+    assert group_lines(half) == [first, second]
+    assert group_lines(half, only_silent=True) == [second]
+    assert group_lines(replace(half, state="finished", islands=())) == [
+        "group 1/3: finished; keeps its migrants for group 0/3",
+        "group 1/3: finished; keeps its migrants for group 2/3" + silence,
+    ]
 
 
 def test_a_damaged_run_is_shown_beside_the_others(

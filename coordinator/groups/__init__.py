@@ -1,0 +1,1 @@
+"""Exchange of migrants between groups of islands, which several coordinators run."""
