@@ -21,6 +21,14 @@ from coordinator.cli.execute import (
 from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.cli.founders import with_founders
+from coordinator.cli.groups import (
+    StartGroups,
+    archipelago_of,
+    check_groups,
+    groups_below,
+    resume_groups,
+    start_groups,
+)
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution import newborns
 from coordinator.evolution.check_encoding import check_brain_genes
@@ -64,11 +72,13 @@ from schema.agent.request_handler import Compute
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
+from schema.agent.topics import check_name
 from schema.errors import ExperimentError, NetworkError
 from schema.experiment.document import Experiment, island_count, island_experiments
+from schema.experiment.identity import WHOLE, Group
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
-from schema.plugins.permission import allow
+from schema.plugins.permission import FLAG, allow
 from schema.tables.arrow import skip_pandas
 from schema.tables.description import KeptFounder
 
@@ -108,13 +118,21 @@ def main(arguments: list[str]) -> int:
     is_shipped = is_campaign_wanted and options.experiments[0] in shipped_campaigns()
     name = "+".join(options.experiments) if is_shipped else joined_name(experiments)
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
+    group, of = _groups(options, experiments)
+    if group.of > 1 and not options.out:
+        folder /= f"group-{group.number}"
     deployment = _deployment(options, experiments, folder)
     repeats, first = options.repeats or 1, options.first_repeat or 0
     if (count := first + repeats) > MOST_REPEATS:
         also = " with those before --first-repeat" if first else ""
         flags.error(f"--repeats: must be <= {MOST_REPEATS}{also}, got {count}")
-    campaign = Campaign(experiments, repeats, options.seed, first, founders)
+    campaign = Campaign(experiments, repeats, options.seed, first, founders, group)
+    if group.of > 1:
+        given = options.archipelago or archipelago_of(campaign)
+        campaign = replace(campaign, archipelago=given)
     begin = start_campaign if is_campaign_wanted else start
+    if of > 1:
+        begin = partial(start_groups, start=StartGroups(_births_of(options), of, main))
     return _stoppable(folder, deployment, lambda: begin(folder, campaign, deployment))
 
 
@@ -145,18 +163,70 @@ def plugin_kinds() -> tuple[Kind, ...]:
     )
 
 
+def _groups(
+    options: argparse.Namespace, experiments: Sequence[Experiment]
+) -> tuple[Group, int]:
+    """Return the group of islands to run, and how many groups to start here."""
+    if options.command == "run":
+        of = options.coordinators or 1
+        if of > 1:
+            _refuse_for_groups(options)
+            check_groups(
+                experiments, of, "--coordinators", is_repeated=_is_repeated(options)
+            )
+        return WHOLE, of
+    group: Group = options.group
+    if group.of > 1:
+        check_groups(
+            experiments, group.of, "--group", is_repeated=_is_repeated(options)
+        )
+        if not options.connect:
+            raise NetworkError(
+                "--group: needs --connect: no group is the hub of the others; start "
+                "one (revolve hub)"
+            )
+    elif options.archipelago:
+        raise NetworkError("--archipelago: has no effect without --group")
+    if options.archipelago:
+        check_name(options.archipelago, "--archipelago")
+    return group, 1
+
+
+def _refuse_for_groups(options: argparse.Namespace) -> None:
+    """Raise if a flag has no meaning for several coordinators."""
+    for flag in ("in-process", "view", "metrics"):
+        if getattr(options, flag.replace("-", "_")):
+            raise NetworkError(f"--{flag}: excludes several coordinators")
+
+
+def _births_of(options: argparse.Namespace) -> list[str]:
+    """Return the words of the command line that determine births."""
+    words = [*options.experiments, "--seed", str(options.seed)]
+    if options.births is not None:
+        words += ["--births", str(options.births)]
+    if options.founders is not None:
+        words += ["--from", options.founders]
+    return [*words, *(word for each in options.plugins for word in (FLAG, each))]
+
+
 def _resume(options: argparse.Namespace) -> int:
     folder = Path(options.folder)
+    groups = groups_below(folder)
+    runs = groups or [folder]
     # First: a finished run needs none of its plug-ins.
-    if options.births is None and (code := finished_code(folder)) is not None:
+    if options.births is None and (code := finished_code(folder, groups)) is not None:
         return code
-    experiments = refuse_faulty_of(folder)
+    experiments = refuse_faulty_of(runs[0])
     if options.births is not None:
-        lengthen_all(folder, options.births)
-        if (code := finished_code(folder)) is not None:
+        for run in runs:
+            lengthen_all(run, options.births)
+        if (code := finished_code(folder, groups)) is not None:
             return code
+    if groups:
+        _refuse_for_groups(options)
     deployment = _deployment(options, experiments, folder)
-    return _stoppable(folder, deployment, lambda: resume(folder, deployment))
+    go_on = partial(resume_groups, groups=groups, main=main) if groups else resume
+    return _stoppable(folder, deployment, lambda: go_on(folder, deployment=deployment))
 
 
 def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int]) -> int:
@@ -168,7 +238,7 @@ def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int])
         tell_user(f"{error}; to resume: {command_line('resume', folder, *flags)}")
         return 1
     except KeyboardInterrupt:
-        if is_campaign(folder) or holds_run(folder):
+        if is_campaign(folder) or holds_run(folder) or groups_below(folder):
             advise(stopped(folder, flags))
         tell_stopped()
         return STOPPED

@@ -1,13 +1,14 @@
 """Deployment of a run: its network, its own processes, its viewer."""
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 
 from coordinator.dispatch.events import AgentKind
+from coordinator.network.hub_service import open_hub
 from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
 from coordinator.run.cross_checks import NO_CHECKS, Checks
@@ -15,11 +16,11 @@ from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
 from coordinator.storage.hints import keep_flags
 from schema.agent.access import Certificate
-from schema.agent.address import ADDRESS
+from schema.agent.address import ADDRESS, new_socket
 from schema.agent.command import name_at
 from schema.agent.log import tell_user
 from schema.agent.machine import platform_tag
-from schema.agent.network import Agent
+from schema.agent.network import Agent, hub_config
 from schema.agent.request_handler import Compute
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool
@@ -98,35 +99,69 @@ def connected_agents(
         )
         # The folder of a run that finds no hub stays empty.
         keep_flags(folder, deployment.resume_flags)
-        file = folder / ADDRESS
-        # Written whole: other processes wait for the file and read it at once.
-        text = "\n".join(dict.fromkeys((network.address, network.own_address, "")))
-        replace_text(file, text)
-        stack.callback(_remove, file, text)
+        _note_addresses(folder, (network.address, network.own_address), stack)
         if deployment.view:
             open_viewer(network.own_address, fleet, tls)
+        pools = stack.enter_context(own_processes(deployment, network.own_address))
+        if deployment.listen is not None:
+            tell_user(f"listening on {network.address}")
+        yield network, pools
+
+
+@contextmanager
+def own_hub(folder: Path, deployment: Deployment) -> Iterator[str]:
+    """Open a hub in this process for the coordinators of a folder, unless one is given.
+
+    Yields:
+        The address where processes of this machine connect to.
+    """
+    with ExitStack() as stack:
+        address, others = deployment.connect or new_socket(), deployment.listen
+        addresses = (*([others] if others else []), address)
+        if not deployment.connect:
+            tls, certificates = deployment.agent.tls, deployment.certificates
+            config = hub_config(addresses, tls, certificates)
+            stack.enter_context(open_hub(config, addresses))
+        keep_flags(folder, deployment.resume_flags)
+        _note_addresses(folder, addresses, stack)
+        if others:
+            tell_user(f"listening on {others}")
+        yield address
+
+
+@contextmanager
+def own_processes(deployment: Deployment, address: str) -> Iterator[list[ProcessPool]]:
+    """Start the workers of a deployment, and the analyzers that they need."""
+    with ExitStack() as stack:
         workers = deployment.workers
         analyzers = ceil(workers / WORKERS_PER_ANALYZER)
         sizes: dict[AgentKind, int] = {"analyzer": analyzers, "worker": workers}
         pools: list[ProcessPool] = []
-        for kind, size in sizes.items() if deployment.workers else ():
+        for kind, size in sizes.items() if workers else ():
             agent = replace(
                 deployment.agent,
                 role=kind,
                 name=f"own-{kind}",
-                connect=network.own_address,
+                connect=address,
                 # The run's copies, which are there by now.
                 plugins=allowed(),
                 processes=size,
             )
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
             pools.append(stack.enter_context(pool))
-        if deployment.listen is not None:
-            tell_user(f"listening on {network.address}")
         # All at once before one is waited for: their grace times run together.
         for pool in pools:
             stack.callback(pool.terminate)
-        yield network, pools
+        yield pools
+
+
+def _note_addresses(folder: Path, addresses: Iterable[str], stack: ExitStack) -> None:
+    """Write the addresses of a hub to a folder; the stack removes them."""
+    file = folder / ADDRESS
+    # Written whole: other processes wait for the file and read it at once.
+    text = "\n".join(dict.fromkeys((*addresses, "")))
+    replace_text(file, text)
+    stack.callback(_remove, file, text)
 
 
 def _remove(file: Path, text: str) -> None:

@@ -125,25 +125,38 @@ def lengthen_all(folder: Path, births: int) -> None:
         write_campaign(folder, replace(campaign, experiments=experiments))
 
 
-def finished_code(folder: Path) -> int | None:
+def finished_code(folder: Path, groups: Sequence[Path] = ()) -> int | None:
     """Return the exit code of a run that needs no resumption, and tell the user so.
 
     The file of its best robot is written if it is missing. None is of a campaign, of a
-    run that is not finished or whose tables are to be written again, and of no run.
+    run that is not finished or whose tables are to be written again, and of no run; a
+    single group of islands may have to serve its migrants. ``groups``: folders of all
+    groups, if there are several.
 
     Raises:
         RunFolderError: a damaged table cannot be written again, or another version of
             Revolve Islands began a run that is to be continued.
     """
+    if groups:
+        if any(_is_to_be_rewritten(one) or not _is_finished(one) for one in groups):
+            return None
+        tell_user(f"{folder}: already finished")
+        return 0 if any(map(has_evaluated, groups)) else 1
     if is_campaign(folder) or not holds_run(folder):
         return None
-    if _is_to_be_rewritten(folder) or read_state(folder) != "finished":
+    if read_description(folder).group.of > 1:
+        return None
+    if _is_to_be_rewritten(folder) or not _is_finished(folder):
         # Before its plug-ins are looked at.
         refuse_other_version(folder)
         return None
     tell_user(f"{folder}: already finished")
     restore_best(folder)
     return 0 if has_evaluated(folder) else 1
+
+
+def _is_finished(folder: Path) -> bool:
+    return read_state(folder) == "finished"
 
 
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:

@@ -15,6 +15,7 @@ from schema.agent.flags import (
     share,
 )
 from schema.experiment.file import shipped_experiments
+from schema.experiment.identity import WHOLE, Group
 
 _COMMANDS = {
     "run": (
@@ -32,6 +33,7 @@ _COMMANDS = {
             "revolve coordinator scenario1 --seed 1    # then: revolve worker",
             "revolve coordinator thesis --repeats 30 --connect hub",
             "revolve coordinator mine.toml --listen tcp/127.0.0.1:7447",
+            "revolve coordinator archipelago-ring --group 0/4 --connect hub",
         ),
     ),
     "resume": (
@@ -62,6 +64,7 @@ _KEPT = (
 )
 """Flags of agents, limits and checks, in the order in which they are advised."""
 _ADDRESS = re.compile(r"(?:(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):)?([0-9]{1,5})")
+_GROUP = re.compile(r"([0-9]{1,5})/([0-9]{1,5})")
 _LAST_PORT = 65535
 _LOOPBACK = "127.0.0.1"
 
@@ -86,6 +89,16 @@ def parser(command: str) -> Flags:
         )
     else:
         _add_experiments(flags)
+    if command == "coordinator":
+        _add_group(flags)
+    elif command == "run":
+        add_count(
+            flags,
+            "--coordinators",
+            None,
+            "number of coordinators, each with a group of the experiment's islands "
+            "(default: one with all islands)",
+        )
     flags.set_defaults(command=command)
     _add_deployment(flags, command)
     return flags
@@ -115,6 +128,34 @@ def resume_flags(options: argparse.Namespace) -> list[str]:
             is_real = isinstance(value, float)
             words += [flag, f"{value:.12g}" if is_real else str(value)]
     return words
+
+
+def _group(text: str) -> Group:
+    """Return the group of a flag's value."""
+    match = _GROUP.fullmatch(text)
+    if match is None or int(match[1]) >= int(match[2]):
+        raise argparse.ArgumentTypeError(
+            f"must be K/N in whole numbers with 0 <= K < N, got {text[:80]!r}"
+        )
+    return Group(number=int(match[1]), of=int(match[2]))
+
+
+def _add_group(flags: argparse.ArgumentParser) -> None:
+    """Add the flags of a coordinator that runs a part of an archipelago."""
+    flags.add_argument(
+        "--group",
+        type=_group,
+        default=WHOLE,
+        metavar="K/N",
+        help="run only the islands i with i modulo N = K; the other groups' "
+        "coordinators connect to the same hub (default: all islands)",
+    )
+    flags.add_argument(
+        "--archipelago",
+        metavar="NAME",
+        help="name of the archipelago that the groups of islands form, for a second "
+        "copy of it at the same hub (default: made of experiment, seed and N)",
+    )
 
 
 def _host_and_port(text: str) -> tuple[str, int]:

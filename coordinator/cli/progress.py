@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Self
+from typing import Protocol, Self
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -22,7 +22,6 @@ from coordinator.cli.status_text import (
     time_left,
     waiting_text,
 )
-from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
@@ -39,19 +38,30 @@ _LEAST_FOR_BAR = 60
 """Characters of the narrowest terminal that has room for a bar."""
 
 
+class Progress(Protocol):
+    """What a display shows; ``active`` are the runs in this process."""
+
+    @property
+    def active(self) -> Sequence[RunSession]:
+        """Runs in this process that are in progress."""
+
+    def status(self, now_s: float, /) -> Status:
+        """Return the progress of all runs."""
+
+
 class Display:
     """Progress bars; without a terminal a line at regular intervals."""
 
     def __init__(
         self,
-        scheduler: RunScheduler,
+        scheduler: Progress,
         *,
         quiet: bool,
         console: Console | None = None,
         place: str = "",
         plugins: Sequence[str] = (),
     ) -> None:
-        """Show all runs of a scheduler; if ``quiet``, only what they wait for.
+        """Show the runs of a scheduler; if ``quiet``, only what they wait for.
 
         The user has to connect agents to ``place``, which import ``plugins``; it is
         empty if this command has started some.
@@ -82,15 +92,19 @@ class Display:
         self._live.stop()
 
     def update(self, now_s: float) -> None:
-        """Show the present state."""
+        """Show the present state, and warn of what the runs wait for."""
         status = self._scheduler.status(now_s)
+        self.show(status, now_s)
+        self._warn_of_missing(status, now_s)
+
+    def show(self, status: Status, now_s: float) -> None:
+        """Show a state."""
         if self._has_bars:
             bars = _bars(status, self._recoveries(), self._console.width)
             self._live.update(bars, refresh=True)
         elif now_s >= self._next_line_s and not self._quiet:
             self._next_line_s = now_s + _LINE_S
             tell_user(", ".join([_line(status), *self._recoveries()]))
-        self._warn_of_missing(status, now_s)
 
     def _recoveries(self) -> list[str]:
         """Describe the runs whose lost poses are computed again."""
@@ -174,7 +188,9 @@ def _rows(status: Status, notes: Sequence[str]) -> Iterator[tuple[str, Counted, 
         yield runs_done(status), status, f"{left}, {rates}"
         active = [run for run in status.runs if run.state == "running"]
         for run in active[:MOST_BARS]:
-            yield f"{run.name}-{run.run}", run, run_details(run)
+            is_group = run.group.of > 1
+            title = f"group {run.group}" if is_group else f"{run.name}-{run.run}"
+            yield title, run, run_details(run)
         return
     (run,) = status.runs
     details = f"{left}, {best_text(run.islands)}, {rates}{about_arenas(run)}"

@@ -2,7 +2,8 @@
 
 import json
 import threading
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 import zenoh
 
@@ -13,7 +14,16 @@ from schema.limits import printable
 
 
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:
-    """Route messages until stopped.
+    """Route messages until stopped; errors as of ``open_hub``."""
+    with open_hub(config, addresses):
+        for address in addresses:
+            tell_user(f"listening on {address}")
+        stop.wait()
+
+
+@contextmanager
+def open_hub(config: str, addresses: tuple[str, ...]) -> Iterator[None]:
+    """Route messages in a context.
 
     Raises:
         NetworkError: an address that cannot be listened on.
@@ -23,9 +33,7 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
     except zenoh.ZError as error:
         raise cannot_listen(", ".join(addresses), str(error)) from None
     with session, watch_unlisted(session, config):
-        for address in addresses:
-            tell_user(f"listening on {address}")
-        stop.wait()
+        yield
 
 
 def watch_unlisted(

@@ -1,7 +1,6 @@
 """Connection of a run to the other groups of islands of its archipelago."""
 
 import time
-from hashlib import blake2b
 
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.groups.exchange import GroupExchange, MigrantsReply
@@ -10,17 +9,18 @@ from coordinator.run.loop import Loop
 from schema.errors import MalformedMessage
 from schema.limits import MIGRANTS_BYTES
 from schema.tables.description import RunDetails
-from schema.wire.codec import decode, encode
+from schema.wire.codec import decode, encode, fingerprint
 
 
 def births_digest(details: RunDetails) -> bytes:
-    """Return 16 bytes that all groups of an archipelago have in common.
+    """Return 8 bytes that all groups of an archipelago have in common.
 
     Document, seed, repeat and number of groups determine them, and no other
     archipelago has the same by chance.
     """
-    about = (details.document, details.seed, details.run, details.group.of)
-    return blake2b(encode(about), digest_size=16).digest()
+    return fingerprint(
+        encode((details.document, details.seed, details.run, details.group.of))
+    )
 
 
 class GroupLink:

@@ -33,6 +33,7 @@ from schema.experiment.file import (
     read_draft,
     shipped_experiments,
 )
+from schema.experiment.identity import WHOLE, Group
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
 from schema.plugins.kept import KeptPlugin, keep
 from schema.tables.description import KeptFounder, RunDetails, read_small
@@ -52,6 +53,7 @@ class Campaign:
         seed: random seed of all runs; the run number selects the random streams.
         first: number of the first repeat; the others follow it.
         founders: given founders of all experiments, by digest.
+        group, archipelago: of a single run, as of ``RunDetails``.
     """
 
     experiments: tuple[Experiment, ...]
@@ -59,12 +61,20 @@ class Campaign:
     seed: int
     first: int = 0
     founders: dict[str, KeptFounder] = field(default_factory=dict)
+    group: Group = WHOLE
+    archipelago: str = ""
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
         """Return folder and details of each run, repeat by repeat."""
         runs = [
             RunDetails(
-                each.name, repeat, self.seed, experiment_text(each), self.founders
+                each.name,
+                repeat,
+                self.seed,
+                experiment_text(each),
+                self.founders,
+                self.group,
+                self.archipelago,
             )
             for repeat in range(self.first, self.first + self.repeats)
             for each in self.experiments

@@ -343,7 +343,7 @@ def serve_as_process(
     """Serve as one process of a pool until a signal or until the parent is gone."""
     allow(agent.plugins)
     stop = stop_on_signals()
-    stop_with_parent(stop)
+    stop_with_parent(stop.set)
     own = agent if agent.version else own_agent(agent, slot.index)
     start_log(own.name)
     say, warn = (_keep_quiet, _keep_quiet) if slot.index else (tell_user, warn_user)

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import active_children
+from multiprocessing import active_children, parent_process
 from pathlib import Path
 from types import FrameType
 
@@ -81,8 +81,8 @@ def advise(line: str) -> None:
 
 
 def tell_stopped() -> None:
-    """Tell the user, once, how to go on after a stop."""
-    if _ADVICE and not _TOLD:
+    """Tell the user, once, how to go on after a stop; not in a child process."""
+    if _ADVICE and not _TOLD and parent_process() is None:
         _TOLD.append(_ADVICE[0])
         with suppress(OSError):
             sys.stderr.write(f"{_ADVICE[0]}\n")

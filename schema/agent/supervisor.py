@@ -279,8 +279,8 @@ def stop_with_input(stop: Callable[[], object]) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def stop_with_parent(stop: threading.Event) -> None:
-    """Set an event when the process that started this one is gone.
+def stop_with_parent(stop: Callable[[], object]) -> None:
+    """Call a function when the process that started this one is gone.
 
     This process exits if it still runs after a grace time: its job may not end.
     """
@@ -290,7 +290,7 @@ def stop_with_parent(stop: threading.Event) -> None:
 
     def watch() -> None:
         connection.wait([parent.sentinel])
-        stop.set()
+        stop()
         time.sleep(GRACE_S)
         os._exit(1)
 

@@ -122,7 +122,7 @@ def test_a_group_of_islands_says_what_it_waits_for() -> None:
     assert group_lines(half, only_silent=True) == [second]
     assert group_lines(replace(half, state="finished", islands=())) == [
         "group 1/3: finished; keeps its migrants for group 0/3",
-        "group 1/3: finished; keeps its migrants for group 2/3" + silence,
+        "group 1/3: finished; keeps its migrants for group 2/3, which does not answer",
     ]
 
 
