@@ -36,7 +36,7 @@ from schema.errors import (
 from schema.experiment.document import Experiment, island_count
 from schema.experiment.identity import Group
 from schema.tables.description import DETAILS, RunDetails, make_folder
-from schema.wire.status import RunStatus, Status
+from schema.wire.status import RunStatus, Status, joined
 
 Main = Callable[[list[str]], int]
 """Runs a command of the coordinator and returns its exit code."""
@@ -56,6 +56,7 @@ class StartGroups(NamedTuple):
     main: Main
 
 
+NO_STATUS = Status((), 0, 0, 0.0)
 _TURN_S = 0.5
 _HUB_S = 30.0
 """Time without a hub after which a coordinator of a group ends [s]."""
@@ -178,7 +179,10 @@ def _execute(
                 for line in pool.look_after():
                     warn_user(line)
             children.look_after()
-        children.stop()
+        # All at once before one is waited for.
+        children.terminate()
+        for pool in pools:
+            pool.terminate()
     if children.failed:
         for path, code in children.failed.items():
             tell_error(f"{path}: its coordinator ended with code {code}")
@@ -189,7 +193,7 @@ def _execute(
         return STOPPED
     for path in begin:
         status = folder_status(path)
-        done = births_done(Status((status,), 0, 0, 0.0))
+        done = births_done(structs.replace(NO_STATUS, runs=(status,)))
         print(f"{path}: {done}, {run_details(status)}")
     print(f"try next:\n  {command('analyze', folder)}")
     return 0
@@ -219,16 +223,12 @@ class _Progress:
 
     def status(self, _now_s: float) -> Status:
         """Return the progress of all groups; of one that does not answer, the last."""
-        workers = analyzers = 0
-        births_per_s = 0.0
+        found = [NO_STATUS]
         for each in self._operator.statuses():
             own = [run for run in each.runs if run.folder in self._known]
             self._known |= {run.folder: run for run in own}
-            if own:
-                workers = max(workers, each.workers)
-                analyzers = max(analyzers, each.analyzers)
-                births_per_s += each.births_per_s
-        return Status(tuple(self._known.values()), workers, analyzers, births_per_s)
+            found += [each] * bool(own)
+        return structs.replace(joined(found), runs=tuple(self._known.values()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +256,12 @@ class _Coordinators:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.stop()
+        self.terminate()
+        until_s = time.monotonic() + GRACE_S
+        for child in self.running:
+            child.process.join(max(0.0, until_s - time.monotonic()))
+            child.process.kill()
+            child.process.join()
 
     def start(self, folder: Path, words: list[str]) -> None:
         """Start the coordinator of a group's folder."""
@@ -278,16 +283,10 @@ class _Coordinators:
                 if code not in (0, STOPPED):
                     self.failed[child.folder] = code
 
-    def stop(self) -> None:
-        """Stop all so that they can be resumed; kill those that take too long."""
+    def terminate(self) -> None:
+        """Ask all to stop, so that they can be resumed."""
         for child in self.running:
             child.process.terminate()
-        until_s = time.monotonic() + GRACE_S
-        for child in self.running:
-            child.process.join(max(0.0, until_s - time.monotonic()))
-            child.process.kill()
-            child.process.join()
-        self.running.clear()
 
 
 def _coordinate(main: Main, words: list[str]) -> None:
@@ -300,4 +299,6 @@ def _coordinate(main: Main, words: list[str]) -> None:
     except RevolveError as error:
         tell_error(f"revolve: {one_line(error)}")
         code = 2
-    sys.exit(code)
+    sys.stderr.flush()
+    # All is closed. The interpreter's own end takes seconds on a busy machine.
+    os._exit(code)

@@ -41,7 +41,7 @@ from schema.wire.operator import (
     OperatorRequest,
     decode_operator_reply,
 )
-from schema.wire.status import RunStatus, Status
+from schema.wire.status import RunStatus, Status, joined
 
 VERSION = 1
 """Of the JSON document; it changes when a key changes its meaning or is removed."""
@@ -119,7 +119,10 @@ def ask(
 
 
 def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | None:
-    """Return name and status of a folder's coordinator; None if none is running."""
+    """Return name and status of a folder's coordinator; None if none is running.
+
+    Those of groups of islands are joined.
+    """
     try:
         options.connect = read_address(folder)
         statuses = ask_status(options)
@@ -128,11 +131,12 @@ def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | Non
             tell_user(f"its coordinator cannot be asked: {error}")
         return None
     here = folder.resolve()
-    for name, status in statuses.items():
-        paths = [Path(run.folder) for run in status.runs]
-        if any(here in (path, path.parent) for path in paths):
-            return name, status
-    return None
+    own = {
+        name: status
+        for name, status in statuses.items()
+        if any(here in (path := Path(run.folder), path.parent) for run in status.runs)
+    }
+    return (", ".join(own), joined([*own.values()])) if own else None
 
 
 def status_json(sources: Sequence[Source]) -> str:

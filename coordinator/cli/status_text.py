@@ -1,6 +1,7 @@
 """Status of runs as text: of ``revolve status``, of the display, of a run's end."""
 
 from collections.abc import Callable, Sequence
+from itertools import chain
 
 from rich.console import Console
 from rich.table import Table
@@ -12,6 +13,8 @@ from schema.limits import printable
 from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
+_MOST_NAMED = 8
+"""Islands that a line names."""
 _MOST_BESTS = 8
 """Islands whose best fitness fits a line."""
 _MEANINGS = {str(kind): meaning for kind, meaning in MEANINGS.items()}
@@ -129,15 +132,25 @@ def group_lines(run: RunStatus, *, only_silent: bool = False) -> list[str]:
         if only_silent and not is_silent:
             continue
         silence = ", which does not answer" * is_silent
-        lines += [
-            f"island {island} waits for island {each} of group {other}{silence}"
+        waiting = {
+            island: [each for each in status.awaited if each % run.group.of == number]
             for island, status in run.numbered
-            for each in status.awaited
-            if each % run.group.of == number
-        ]
+        }
+        if any(waiting.values()):
+            here = _listed([island for island, awaited in waiting.items() if awaited])
+            there = _listed(sorted({*chain(*waiting.values())}))
+            verb = "waits" if here.startswith("island ") else "wait"
+            lines.append(f"{here} {verb} for {there} of group {other}{silence}")
         if run.state == "finished" and number in run.unserved_groups:
             lines.append(f"finished; keeps its migrants for group {other}{silence}")
     return [f"group {run.group}: {line}" for line in lines]
+
+
+def _listed(islands: Sequence[int]) -> str:
+    """Return the names of islands, of which there is one at least."""
+    names = ", ".join(map(str, islands[:_MOST_NAMED]))
+    more = f" and {len(islands) - _MOST_NAMED} more" * (len(islands) > _MOST_NAMED)
+    return f"island{'s' * (len(islands) > 1)} {names}{more}"
 
 
 def trouble_lines(status: Status) -> list[str]:

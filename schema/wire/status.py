@@ -1,6 +1,6 @@
 """Progress of runs, as a coordinator reports it or a run folder shows it."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import count
 from typing import Annotated, Literal
 
@@ -168,6 +168,19 @@ class Status(Message, frozen=True):
     def left_s(self) -> float | None:
         """Estimated time to the end at the present rate [s]; None if unknown."""
         return _left_s(self.runs, self.births_per_s)
+
+
+def joined(statuses: Sequence[Status]) -> Status:
+    """Return the progress of the coordinators of one fleet, whose agents they share."""
+    return Status(
+        runs=tuple(run for each in statuses for run in each.runs),
+        workers=max(each.workers for each in statuses),
+        analyzers=max(each.analyzers for each in statuses),
+        births_per_s=sum(each.births_per_s for each in statuses),
+        faults=tuple(fault for each in statuses for fault in each.faults),
+        queues=tuple(queue for each in statuses for queue in each.queues),
+        silent={k: v for each in statuses for k, v in each.silent.items()},
+    )
 
 
 def _left_s(runs: Iterable[RunStatus], births_per_s: float) -> float | None:

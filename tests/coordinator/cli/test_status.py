@@ -109,14 +109,16 @@ def test_an_arena_in_parts_has_a_line() -> None:
 
 
 def test_a_group_of_islands_says_what_it_waits_for() -> None:
-    islands = (IslandStatus(10, 20, None, 10, awaited=(0, 2)),)
+    first_island = IslandStatus(10, 20, None, 10, awaited=(0, 2))
+    islands = (first_island, replace(first_island, awaited=(3, 5)))
     half = RunStatus(
         "/x/a", "ring", 0, "running", islands=islands, group=Group(number=1, of=3),
         silent_groups=(2,), unserved_groups=(0, 2),
     )  # fmt: skip
-    first = "group 1/3: island 1 waits for island 0 of group 0/3"
+    first = "group 1/3: islands 1, 4 wait for islands 0, 3 of group 0/3"
     second = (
-        "group 1/3: island 1 waits for island 2 of group 2/3, which does not answer"
+        "group 1/3: islands 1, 4 wait for islands 2, 5 of group 2/3, which does not "
+        "answer"
     )
     assert group_lines(half) == [first, second]
     assert group_lines(half, only_silent=True) == [second]
