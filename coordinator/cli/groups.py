@@ -69,9 +69,11 @@ def check_groups(
     if len(experiments) > 1 or is_repeated:
         raise ExperimentError(f"{flag}: is for a single run, not for a campaign")
     name, count = experiments[0].name, island_count(experiments[0])
+    if count == 1:
+        raise ExperimentError(f"{flag}: {name} has no islands to divide")
     if of > count:
-        least = f"the number of islands of {name}" if count > 1 else f"{name} has none"
-        raise ExperimentError(f"{flag}: must be <= {count}, {least}, got {of}")
+        why = f"the number of islands of {name}"
+        raise ExperimentError(f"{flag}: must be <= {count}, {why}, got {of}")
 
 
 def archipelago_of(campaign: Campaign) -> str:

@@ -15,16 +15,17 @@ class Outbox:
     Attributes:
         size: number of events in it; it only grows.
         served: groups that need no more of it.
+        sent: its events by source and target, in order.
     """
 
     def __init__(self) -> None:
         self.size = 0
         self.served: set[int] = set()
-        self._sent: dict[tuple[int, int], list[MigrationEvent]] = defaultdict(list)
+        self.sent: dict[tuple[int, int], list[MigrationEvent]] = defaultdict(list)
 
     def put(self, event: MigrationEvent) -> None:
         """Add what an island sent: its migrants epoch by epoch, at last its closing."""
-        self._sent[source_of(event), event.island].append(event)
+        self.sent[source_of(event), event.island].append(event)
         self.size += 1
 
     def get(self, source: int, target: int, epoch: int) -> MigrationEvent | None:
@@ -32,7 +33,7 @@ class Outbox:
 
         None if the source has not sent them yet.
         """
-        sent = self._sent.get((source, target), [])
+        sent = self.sent.get((source, target), [])
         if epoch < len(sent):
             return sent[epoch]
         is_closed = sent and isinstance(sent[-1], NeighbourClosed)

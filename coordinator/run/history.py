@@ -50,7 +50,9 @@ def begun_loop(details: RunDetails, store: Snapshots = NO_SNAPSHOTS) -> Loop:
     """
     experiment = experiment_from_text(details.document)
     loop = Loop(
-        archipelago(experiment, details.seed, details.run, details.founders),
+        archipelago(
+            experiment, details.seed, details.run, details.founders, details.group
+        ),
         context=RunContext.of(details.name, 0, experiment, details.origin),
         fleet=JobRouter(LocalAgents({}, "")),
         log=None,

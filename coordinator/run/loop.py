@@ -58,7 +58,8 @@ Request = Breed | Evaluate | AdvanceShard | Ask
 """Commands of islands and arenas that agents or learners carry out."""
 
 Question = Request | tuple[AdvanceShard | None, int]
-"""What an event answers: a request, or for an order an advance and a step."""
+"""What an event answers: a request, for an order an advance and a step, or for migrants
+of another group their epoch."""
 
 Event = Started | ExternalEvent | MigrationEvent
 """Events of islands and arenas."""
@@ -156,12 +157,15 @@ class Loop:
     def question(self, event: JournalledEvent) -> Question | None:
         """Return what an event of the journal answers here; None for nothing.
 
-        An order answers nothing, but its arena must stand at the same decision.
+        An order answers nothing, but its arena must stand at the same decision. That a
+        neighbour closed depends on the number of its births.
         """
         if isinstance(event, Audited | Answered):
             answer = event.first if isinstance(event, Audited) else event
             return self._unanswered.get(key_of(answer))
-        if isinstance(event, Immigrated | NeighbourClosed | Served):
+        if isinstance(event, Immigrated):
+            return self._awaited(event)
+        if isinstance(event, NeighbourClosed | Served):
             return None
         requested = self.shard_requests.requested(event.island)
         if isinstance(event, Advanced):
@@ -170,6 +174,16 @@ class Loop:
         arena = self.islands.get(event.island)
         is_due = isinstance(arena, Arena) and arena.next_step == event.step
         return (requested, event.step) if is_due else None
+
+    def _awaited(self, event: Immigrated) -> Question | None:
+        """Return what migrants answer if an island here awaits them.
+
+        None if they would be others in a longer run.
+        """
+        epochs = self.islands[event.island].epochs
+        awaited = epochs.next_epochs.get(event.source) if epochs else None
+        is_it = awaited == event.epoch and not event.follows_closing
+        return (None, event.epoch) if is_it else None
 
     def _note(self, requests: Iterable[Request]) -> None:
         for request in requests:
