@@ -11,7 +11,6 @@ from typing import TypeVar
 import zenoh
 
 from coordinator.dispatch.faults import PeerFaults
-from schema.agent.network import ASK_TIMEOUT_S
 from schema.agent.topics import Member, announced_by_all, member_of, migrants_of_all
 from schema.errors import MalformedMessage
 from schema.limits import MIGRANTS_REQUEST_BYTES, MOST_PEERS, MOST_QUERIES
@@ -19,6 +18,8 @@ from schema.wire.codec import decode, encode
 from schema.wire.migration import GroupNews, MigrantsRequest
 
 T = TypeVar("T")
+WAIT_S = 3.0
+"""Time for the replies to a request; a process that keeps silent delays others [s]."""
 
 
 @dataclass(slots=True)
@@ -120,7 +121,7 @@ class MigrationService:
             migrants_of_all(self._me.fleet),
             zenoh.handlers.Callback(sent.take, end, indirect=False),
             payload=encode(request),
-            timeout=ASK_TIMEOUT_S,
+            timeout=WAIT_S,
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )

@@ -1,0 +1,117 @@
+"""Groups of islands on several coordinators have the births of one archipelago."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from coordinator.groups.exchange import MigrantsReply
+from coordinator.islands.events import Immigrated
+from coordinator.network.service import session_config
+from schema.agent.network import client_config
+from schema.agent.topics import Member
+from schema.limits import MIGRANTS_REQUEST_BYTES
+from schema.wire.codec import decode, encode
+from schema.wire.migration import MigrantsRequest
+from tests.system.documents import RING
+from tests.system.fleet import kill_beyond, size
+from tests.system.groups import differing_tables
+from tests.system.workspace import Process, Workspace, free_address, wait_until
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+GROUPS = ("group-0", "group-1")
+
+
+def coordinator(workspace: Workspace, number: int, address: str) -> Process:
+    """Start the coordinator of a group of two, as a user does by hand."""
+    (workspace.folder / "x.toml").write_text(RING)
+    words = ("x.toml", "--seed", "3", "--births", "34", "--quiet")
+    where = ("--connect", address, "--out", f"two/{GROUPS[number]}")
+    return workspace.start("coordinator", *words, "--group", f"{number}/2", *where)
+
+
+@contextmanager
+def liar(address: str) -> Iterator[None]:
+    """Answer all requests for migrants falsely, by the keys of a coordinator."""
+    member = Member("default", "coordinator", "liar.1")
+    config = session_config(client_config(address), member)
+
+    def lie(query: zenoh.Query) -> None:
+        assert query.payload is not None
+        request = decode(
+            MigrantsRequest, query.payload.to_bytes(), MIGRANTS_REQUEST_BYTES
+        )
+        events = tuple(
+            Immigrated(each.target, each.source, each.epoch + 1, ())
+            for each in request.needed
+        )
+        with query:
+            query.reply(member.migrants, encode(MigrantsReply(events)))
+
+    with zenoh.open(config) as session:
+        told = session.declare_queryable(member.migrants, lie, complete=True)
+        yield
+        told.undeclare()  # type: ignore[no-untyped-call]
+
+
+def test_two_groups_have_the_births_of_one_coordinator(workspace: Workspace) -> None:
+    whole = workspace.finished(RING, 34, "whole")
+    address = free_address()
+    workspace.start("hub", "--listen", address)
+    folders = [workspace.folder / "two" / name for name in GROUPS]
+    groups = [coordinator(workspace, number, address) for number in (0, 1)]
+    agents = ("--connect", address, "--processes", "1")
+    for role in ("analyzer", "worker"):
+        workspace.start(role, *agents)
+    with liar(address):
+        kill_beyond(groups[0], folders[0], 0.25 * size(whole))
+        reached = size(folders[0])
+        resumed = ("resume", "two/group-0", "--connect", address, "--quiet")
+        groups[0] = workspace.start(*resumed)
+        told = "".join(map(end_of, groups))
+    assert "migrants: liar.1: migrants that cannot be those of the archipelago" in told
+    assert "got those of epoch 1" in told
+    assert 0.2 * size(whole) < reached < size(folders[0])
+    assert differing_tables(whole, folders) == []
+    longer_groups_equal_a_longer_run(workspace, folders)
+
+
+def longer_groups_equal_a_longer_run(workspace: Workspace, folders: list[Path]) -> None:
+    told = workspace.run("resume", "two", "--workers", "1", "--quiet")
+    assert "two: already finished" in told
+    before = [size(folder) for folder in folders]
+    words = ("resume", "two", "--births", "50", "--workers", "1", "--quiet")
+    told = workspace.run(*words)
+    assert "two/group-1: 200 of 200 births" in told
+    assert all(new > old for new, old in zip(map(size, folders), before, strict=True))
+    longer = workspace.finished(RING, 50, "longer")
+    assert differing_tables(longer, folders) == []
+
+
+def end_of(process: Process) -> str:
+    """Wait for the successful end of a process; return what it wrote."""
+    wait_until(lambda: process.poll() is not None, "the group ends")
+    out, err = process.communicate()
+    assert process.returncode == 0, err
+    return f"{out}{err}"
+
+
+def test_one_command_runs_all_groups(workspace: Workspace) -> None:
+    whole = workspace.finished(RING, 34, "whole")
+    words = ("run", "x.toml", "--seed", "3", "--births", "34", "--coordinators", "3")
+    started = workspace.start(*words, "--workers", "2", "--out", "three")
+    folders = [workspace.folder / "three" / f"group-{number}" for number in range(3)]
+    wait_until(lambda: size(folders[2]) > 0.1 * size(whole), "births")
+    started.terminate()
+    started.communicate()
+    assert started.returncode == 130
+    assert {(each / "state").read_text() for each in folders} == {"stopped"}
+    assert "0 of 3 runs finished" in workspace.run("status", "three")
+    told = workspace.run("resume", "three", "--workers", "2", "--quiet")
+    assert [line.split(":")[0] for line in told.splitlines() if "births" in line] == [
+        f"three/group-{number}" for number in range(3)
+    ]
+    assert differing_tables(whole, folders) == []
