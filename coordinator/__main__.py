@@ -22,9 +22,9 @@ from coordinator.cli.flags import parser as run_flags
 from coordinator.cli.flags import resume_flags
 from coordinator.cli.founders import with_founders
 from coordinator.cli.groups import (
-    StartGroups,
     archipelago_of,
     check_groups,
+    execute_groups,
     groups_below,
     resume_groups,
     start_groups,
@@ -132,7 +132,9 @@ def main(arguments: list[str]) -> int:
         campaign = replace(campaign, archipelago=given)
     begin = start_campaign if is_campaign_wanted else start
     if of > 1:
-        begin = partial(start_groups, start=StartGroups(_births_of(options), of, main))
+        commands = start_groups(folder, campaign, of, _births_of(options))
+        go = partial(execute_groups, folder, commands, deployment, main)
+        return _stoppable(folder, deployment, go)
     return _stoppable(folder, deployment, lambda: begin(folder, campaign, deployment))
 
 
@@ -225,8 +227,11 @@ def _resume(options: argparse.Namespace) -> int:
     if groups:
         _refuse_for_groups(options)
     deployment = _deployment(options, experiments, folder)
-    go_on = partial(resume_groups, groups=groups, main=main) if groups else resume
-    return _stoppable(folder, deployment, lambda: go_on(folder, deployment=deployment))
+    if groups:
+        commands = resume_groups(groups)
+        go = partial(execute_groups, folder, commands, deployment, main)
+        return _stoppable(folder, deployment, go)
+    return _stoppable(folder, deployment, lambda: resume(folder, deployment))
 
 
 def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int]) -> int:

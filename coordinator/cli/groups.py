@@ -6,29 +6,31 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass
+from contextlib import ExitStack, suppress
+from itertools import chain
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import NamedTuple, Self
+from uuid import uuid4
 
 from msgspec import structs
 
 from coordinator.cli.deployment import Deployment, own_hub, own_processes
 from coordinator.cli.progress import Display
 from coordinator.cli.status_text import births_done, run_details
-from coordinator.network.client_service import Operator
+from coordinator.network.client_service import ask_coordinators
 from coordinator.run.group_link import births_digest
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.hints import command, stopped
-from schema.agent.log import tell_error, tell_user, warn_user
+from schema.agent.log import tell_error, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import GRACE_S, stop_on_signals, stop_with_parent
 from schema.errors import (
     ExperimentError,
+    MalformedMessage,
+    NetworkError,
     RevolveError,
     RunFolderError,
     one_line,
@@ -36,28 +38,17 @@ from schema.errors import (
 from schema.experiment.document import Experiment, island_count
 from schema.experiment.identity import Group
 from schema.tables.description import DETAILS, RunDetails, make_folder
+from schema.wire.codec import encode
+from schema.wire.operator import GetStatus, OperatorRequest, decode_operator_reply
 from schema.wire.status import RunStatus, Status, joined
 
 Main = Callable[[list[str]], int]
 """Runs a command of the coordinator and returns its exit code."""
+Commands = dict[Path, tuple[RunDetails, list[str]]]
+"""Description of each group and the command of its coordinator, by folder."""
 
-
-class StartGroups(NamedTuple):
-    """How to start the coordinators of groups.
-
-    Attributes:
-        words: experiment and flags that determine the births.
-        of: number of groups.
-        main: runs a coordinator's command in a process of its own.
-    """
-
-    words: Sequence[str]
-    of: int
-    main: Main
-
-
-NO_STATUS = Status((), 0, 0, 0.0)
-_TURN_S = 0.5
+_NO_STATUS = Status((), 0, 0, 0.0)
+_TURN_S = 1.0
 _HUB_S = 30.0
 """Time without a hub after which a coordinator of a group ends [s]."""
 
@@ -94,32 +85,28 @@ def groups_below(folder: Path) -> list[Path]:
     known = {each: read_details(each) for each in folders}
     first = known[folders[0]]
     for path, details in known.items():
-        same = structs.replace(details, group=first.group)
-        if same != first or details.group.of != first.group.of:
+        own = structs.replace(details.group, number=first.group.number)
+        if structs.replace(details, group=own) != first:
             raise RunFolderError(
                 f"{path}: must be a group of the archipelago of {folders[0]}"
             )
-    of = first.group.of
-    numbered = {details.group.number: path for path, details in known.items()}
-    for number in range(of):
-        if number not in numbered:
-            raise RunFolderError(
-                f"{folder}: group {Group(number=number, of=of)} is missing"
-            )
-    return [numbered[number] for number in range(of)]
+    found = {details.group.number: path for path, details in known.items()}
+    for number in range(first.group.of):
+        if number not in found:
+            lost = structs.replace(first.group, number=number)
+            raise RunFolderError(f"{folder}: group {lost} is missing")
+    return [found[number] for number in sorted(found)]
 
 
 def start_groups(
-    folder: Path,
-    campaign: Campaign,
-    deployment: Deployment,
-    start: StartGroups,
-) -> int:
-    """Run an archipelago in a new folder, a coordinator per group; return the code.
+    folder: Path, campaign: Campaign, of: int, words: Sequence[str]
+) -> Commands:
+    """Return the commands that begin an archipelago in a new folder.
+
+    ``of``: number of groups. ``words``: experiment and flags that determine births.
 
     Raises:
         RunFolderError: the folder is used.
-        NetworkError: the address cannot be listened on, or no hub answers.
     """
     make_folder(folder)
     if any(folder.iterdir()):
@@ -129,76 +116,84 @@ def start_groups(
         )
     name = secrets.token_hex(6)
     ((_, whole),) = campaign.runs(folder)
-    begin: dict[Path, tuple[RunDetails, list[str]]] = {}
-    for number in range(start.of):
-        group, path = Group(number=number, of=start.of), folder / f"group-{number}"
+    commands: Commands = {}
+    for number in range(of):
+        group, path = Group(number=number, of=of), folder / f"group-{number}"
         flags = ["--group", str(group), "--archipelago", name, "--out", str(path)]
         details = structs.replace(whole, group=group, archipelago=name)
-        begin[path] = details, ["coordinator", *start.words, *flags]
-    return _execute(folder, begin, deployment, start.main)
+        commands[path] = details, ["coordinator", *words, *flags]
+    return commands
 
 
-def resume_groups(
-    folder: Path, groups: Sequence[Path], deployment: Deployment, main: Main
+def resume_groups(groups: Sequence[Path]) -> Commands:
+    """Return the commands that continue groups."""
+    return {path: (read_details(path), ["resume", str(path)]) for path in groups}
+
+
+def execute_groups(
+    folder: Path, commands: Commands, deployment: Deployment, main: Main
 ) -> int:
-    """Continue all groups of a folder; return the exit code.
+    """Start a hub, agents and a coordinator per group; return the exit code.
+
+    ``main``: runs a coordinator's command, in a process of its own.
 
     Raises:
         NetworkError: the address cannot be listened on, or no hub answers.
     """
-    begin = {path: (read_details(path), ["resume", str(path)]) for path in groups}
-    return _execute(folder, begin, deployment, main)
-
-
-def _execute(
-    folder: Path,
-    begin: dict[Path, tuple[RunDetails, list[str]]],
-    deployment: Deployment,
-    main: Main,
-) -> int:
-    """Start a hub, agents and a coordinator per group; return the exit code."""
     advise(stopped(folder, deployment.resume_flags))
     stop = stop_on_signals()
     known = {
         str(path.resolve()): unbegun_status(path, details)
-        for path, (details, _) in begin.items()
+        for path, (details, _) in commands.items()
     }
+    failed: dict[Path, int] = {}
     with ExitStack() as stack:
         address = stack.enter_context(own_hub(folder, deployment))
-        operator = stack.enter_context(
-            Operator(address, deployment.agent.fleet, deployment.agent.tls)
-        )
-        progress = _Progress(operator, known)
         pools = stack.enter_context(own_processes(deployment, address))
-        children = stack.enter_context(_Coordinators(main))
-        for path, (_, words) in begin.items():
-            children.start(path, [*words, *_flags(deployment, address)])
-        display = stack.enter_context(Display(progress, quiet=deployment.quiet))
-        while children.running and not children.failed and not stop.is_set():
-            stop.wait(_TURN_S)
-            display.show(progress.status(time.monotonic()), time.monotonic())
-            for pool in pools:
-                for line in pool.look_after():
-                    warn_user(line)
-            children.look_after()
+        running: dict[Path, SpawnProcess] = {}
+        stack.callback(_end, running)
+        for path, (_, words) in commands.items():
+            running[path] = _start(main, [*words, *_flags(deployment, address)])
+        display = stack.enter_context(Display(None, quiet=deployment.quiet))
+        while running and not failed and not stop.wait(_TURN_S):
+            display.show(_progress(address, deployment, known), time.monotonic())
+            for line in chain.from_iterable(pool.look_after() for pool in pools):
+                warn_user(line)
+            failed = _take_ended(running)
         # All at once before one is waited for.
-        children.terminate()
+        for child in running.values():
+            child.terminate()
         for pool in pools:
             pool.terminate()
-    if children.failed:
-        for path, code in children.failed.items():
-            tell_error(f"{path}: its coordinator ended with code {code}")
-        tell_user(stopped(folder, deployment.resume_flags))
-        return 1
-    if stop.is_set():
+    for path, code in failed.items():
+        tell_error(f"{path}: its coordinator ended with code {code}")
+    if failed or running:
         tell_stopped()
-        return STOPPED
-    for path in begin:
+        return 1 if failed else STOPPED
+    for path in commands:
         status = folder_status(path)
-        done = births_done(structs.replace(NO_STATUS, runs=(status,)))
+        done = births_done(structs.replace(_NO_STATUS, runs=(status,)))
         print(f"{path}: {done}, {run_details(status)}")
     print(f"try next:\n  {command('analyze', folder)}")
     return 0
+
+
+def _progress(
+    address: str, deployment: Deployment, known: dict[str, RunStatus]
+) -> Status:
+    """Return the progress of all groups; of one that does not answer, the last."""
+    found = [_NO_STATUS]
+    with suppress(NetworkError, MalformedMessage):
+        agent, request = deployment.agent, OperatorRequest(uuid4().hex, 0, GetStatus())
+        replies = ask_coordinators(
+            encode(request), connect=address, fleet=agent.fleet, tls=agent.tls
+        )
+        for data in replies.values():
+            status = decode_operator_reply(data).status or _NO_STATUS
+            own = [run for run in status.runs if run.folder in known]
+            known |= {run.folder: run for run in own}
+            found += [status] * bool(own)
+    return structs.replace(joined(found), runs=tuple(known.values()))
 
 
 def _flags(deployment: Deployment, address: str) -> list[str]:
@@ -211,84 +206,36 @@ def _flags(deployment: Deployment, address: str) -> list[str]:
     return [*flags, *(w for w in ("--allow-drift", "--fsync") if w in words)]
 
 
-class _Progress:
-    """Progress of all groups, as their coordinators report it.
-
-    Attributes:
-        active: runs in this process: none.
-    """
-
-    def __init__(self, operator: Operator, known: dict[str, RunStatus]) -> None:
-        """Initialise; ``known``: status of each group before it starts, by folder."""
-        self.active: tuple[()] = ()
-        self._operator, self._known = operator, known
-
-    def status(self, _now_s: float) -> Status:
-        """Return the progress of all groups; of one that does not answer, the last."""
-        found = [NO_STATUS]
-        for each in self._operator.statuses():
-            own = [run for run in each.runs if run.folder in self._known]
-            self._known |= {run.folder: run for run in own}
-            found += [each] * bool(own)
-        return structs.replace(joined(found), runs=tuple(self._known.values()))
+def _start(main: Main, words: list[str]) -> SpawnProcess:
+    """Start the coordinator of a group."""
+    process = get_context("spawn").Process(target=_coordinate, args=(main, words))
+    # A Ctrl-C of the terminal reaches all; only this process may act on it.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return process
 
 
-@dataclass(frozen=True, slots=True)
-class _Child:
-    """Process of a group's coordinator."""
+def _take_ended(running: dict[Path, SpawnProcess]) -> dict[Path, int]:
+    """Remove the processes that have ended; return the codes of those that failed."""
+    codes = {path: process.exitcode for path, process in running.items()}
+    for path, code in codes.items():
+        if code is not None:
+            del running[path]
+    return {path: code for path, code in codes.items() if code}
 
-    folder: Path
-    process: SpawnProcess
 
-
-class _Coordinators:
-    """Processes of coordinators; none outlives this process.
-
-    Attributes:
-        running: those that have not ended.
-        failed: exit codes of those that failed, by folder.
-    """
-
-    def __init__(self, main: Main) -> None:
-        self.running: list[_Child] = []
-        self.failed: dict[Path, int] = {}
-        self._main = main
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.terminate()
-        until_s = time.monotonic() + GRACE_S
-        for child in self.running:
-            child.process.join(max(0.0, until_s - time.monotonic()))
-            child.process.kill()
-            child.process.join()
-
-    def start(self, folder: Path, words: list[str]) -> None:
-        """Start the coordinator of a group's folder."""
-        arguments = (self._main, words)
-        process = get_context("spawn").Process(target=_coordinate, args=arguments)
-        # A Ctrl-C of the terminal reaches all; only this process may act on it.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        self.running.append(_Child(folder, process))
-
-    def look_after(self) -> None:
-        """Note which have ended."""
-        for child in list(self.running):
-            if (code := child.process.exitcode) is not None:
-                self.running.remove(child)
-                if code not in (0, STOPPED):
-                    self.failed[child.folder] = code
-
-    def terminate(self) -> None:
-        """Ask all to stop, so that they can be resumed."""
-        for child in self.running:
-            child.process.terminate()
+def _end(running: dict[Path, SpawnProcess]) -> None:
+    """Let processes stop so that they can be resumed; kill those that take long."""
+    until_s = time.monotonic() + GRACE_S
+    for process in running.values():
+        process.terminate()
+    for process in running.values():
+        process.join(max(0.0, until_s - time.monotonic()))
+        process.kill()
+        process.join()
 
 
 def _coordinate(main: Main, words: list[str]) -> None:

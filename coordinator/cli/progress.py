@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Protocol, Self
+from typing import Self
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -22,6 +22,7 @@ from coordinator.cli.status_text import (
     time_left,
     waiting_text,
 )
+from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
 from schema.agent.log import log_form, tell_user, warn_user
@@ -38,30 +39,21 @@ _LEAST_FOR_BAR = 60
 """Characters of the narrowest terminal that has room for a bar."""
 
 
-class Progress(Protocol):
-    """What a display shows; ``active`` are the runs in this process."""
-
-    @property
-    def active(self) -> Sequence[RunSession]:
-        """Runs in this process that are in progress."""
-
-    def status(self, now_s: float, /) -> Status:
-        """Return the progress of all runs."""
-
-
 class Display:
     """Progress bars; without a terminal a line at regular intervals."""
 
     def __init__(
         self,
-        scheduler: Progress,
+        scheduler: RunScheduler | None,
         *,
         quiet: bool,
         console: Console | None = None,
         place: str = "",
         plugins: Sequence[str] = (),
     ) -> None:
-        """Show the runs of a scheduler; if ``quiet``, only what they wait for.
+        """Show all runs of a scheduler; if ``quiet``, only what they wait for.
+
+        Without a scheduler it shows what ``show`` gets.
 
         The user has to connect agents to ``place``, which import ``plugins``; it is
         empty if this command has started some.
@@ -93,6 +85,7 @@ class Display:
 
     def update(self, now_s: float) -> None:
         """Show the present state, and warn of what the runs wait for."""
+        assert self._scheduler is not None
         status = self._scheduler.status(now_s)
         self.show(status, now_s)
         self._warn_of_missing(status, now_s)
@@ -106,13 +99,17 @@ class Display:
             self._next_line_s = now_s + _LINE_S
             tell_user(", ".join([_line(status), *self._recoveries()]))
 
+    @property
+    def _active(self) -> list[RunSession]:
+        return self._scheduler.active if self._scheduler else []
+
     def _recoveries(self) -> list[str]:
         """Describe the runs whose lost poses are computed again."""
         return [
             "recomputing poses of {}: advance {} of {}".format(
                 run.held.path.name, *run.recovery.progress
             )
-            for run in self._scheduler.active
+            for run in self._active
             if run.recovery is not None
         ]
 
@@ -138,7 +135,7 @@ class Display:
             ]
             how = f"; to start some on this machine: {', '.join(starts)}"
             self._warn(f"{line}{how if self._place else ''}")
-        active = self._scheduler.active
+        active = self._active
         waiting = [line for run in active for line in _waiting(run, missing)]
         for run in status.runs:
             waiting += group_lines(run, only_silent=True)

@@ -7,7 +7,7 @@ what it has sent, and ends no earlier.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf
 from typing import Protocol
 
@@ -19,8 +19,8 @@ from schema.errors import MalformedMessage
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Group
 from schema.limits import MIGRANTS_BYTES
-from schema.wire.codec import Message, encode
-from schema.wire.migration import GroupNews, MigrantsRequest, Needed
+from schema.wire.codec import Message, encode, fingerprint
+from schema.wire.migration import MigrantsRequest, Needed
 
 ASK_S = 2.0
 """Time between two requests to a group that has announced nothing [s]."""
@@ -52,6 +52,11 @@ class MigrantsReply(Message, frozen=True):
     differs: bool = False
 
 
+def announcement(archipelago: str, group: int) -> bytes:
+    """Return what a group publishes when its islands have sent something."""
+    return fingerprint(encode((archipelago, group)))
+
+
 @dataclass(slots=True)
 class _Partner:
     """A group whose islands are neighbours of those here.
@@ -73,19 +78,6 @@ class _Partner:
     is_told: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """What came of the replies to a request.
-
-    Attributes:
-        events: for the journal, then for the islands.
-        faults: name of a coordinator, and why its reply is not used.
-    """
-
-    events: list[MigrationEvent] = field(default_factory=list)
-    faults: list[tuple[str, str]] = field(default_factory=list)
-
-
 class GroupExchange:
     """State machine of the exchange; time is that of a monotonic clock [s]."""
 
@@ -105,9 +97,8 @@ class GroupExchange:
         ``digest``: of what determines the births. ``islands``: those of the group.
         ``experiments``: settings of all islands. ``outbox``: what they have sent.
         """
-        self.news = GroupNews(archipelago, group.number)
-        self._digest = digest
-        self._of = group.of
+        self.news = announcement(archipelago, group.number)
+        self._archipelago, self._digest, self._group = archipelago, digest, group
         self._islands = islands
         self._experiments = experiments
         self._outbox = outbox
@@ -129,11 +120,10 @@ class GroupExchange:
         self._announced = self._outbox.size
         return has_news
 
-    def announced(self, news: GroupNews) -> None:
-        """Take an announcement."""
-        partner = self._partners.get(news.group)
-        if news.archipelago == self.news.archipelago and partner is not None:
-            partner.has_news = True
+    def announced(self, news: bytes) -> None:
+        """Take an announcement, of any archipelago."""
+        for number, partner in self._partners.items():
+            partner.has_news |= news == announcement(self._archipelago, number)
 
     @property
     def wake_s(self) -> float:
@@ -161,8 +151,8 @@ class GroupExchange:
             own = tuple(needed.get(number, ()))
             if own or not partner.is_told:
                 partner.is_asked = True
-                name, by = self.news.archipelago, self.news.group
-                requests.append(MigrantsRequest(name, self._digest, by, number, own))
+                about = (self._archipelago, self._digest, self._group.number)
+                requests.append(MigrantsRequest(*about, number, own))
         return requests
 
     def _needed(self) -> dict[int, list[Needed]]:
@@ -174,7 +164,7 @@ class GroupExchange:
             for source, epoch in sorted(island.epochs.next_epochs.items()):
                 if source not in self._islands:
                     each = Needed(source, target, epoch)
-                    needed.setdefault(source % self._of, []).append(each)
+                    needed.setdefault(source % self._group.of, []).append(each)
         return needed
 
     def take(
@@ -182,12 +172,16 @@ class GroupExchange:
         request: MigrantsRequest,
         replies: Sequence[tuple[str, MigrantsReply]],
         now_s: float,
-    ) -> Taken:
+    ) -> tuple[list[MigrationEvent], list[tuple[str, str]]]:
         """Take the replies to a request, each with the name of its coordinator.
 
         Where coordinators of the same group differ, neither is believed.
+
+        Returns:
+            Events for the journal and then for the islands; names of coordinators, and
+            why their replies are not used.
         """
-        partner, taken = self._partners[request.to], Taken()
+        partner, faults = self._partners[request.to], list[tuple[str, str]]()
         partner.is_asked = False
         partner.is_silent = not replies
         valid: dict[tuple[int, int], list[MigrationEvent]] = {}
@@ -197,19 +191,20 @@ class GroupExchange:
                     known = valid.setdefault((source_of(each), each.island), [])
                     known += [each] * (each not in known)
             except MalformedMessage as error:
-                taken.faults.append((name, str(error)))
+                faults.append((name, str(error)))
                 continue
             partner.heard_s = now_s
             partner.is_told |= not request.needed
+        taken: list[MigrationEvent] = []
         for (source, island), events in valid.items():
             if len(events) > 1:
                 why = f"{len(replies)} coordinators differ about island {source}"
-                taken.faults.extend((name, why) for name, _ in replies)
+                faults.extend((name, why) for name, _ in replies)
             elif not self._islands[island].is_finished:
-                taken.events.append(events[0])
+                taken.append(events[0])
         # It may have sent more than the epoch that was needed, or than fits.
-        partner.has_news |= bool(taken.events)
-        return taken
+        partner.has_news |= bool(taken)
+        return taken, faults
 
     def _checked(
         self, request: MigrantsRequest, reply: MigrantsReply
@@ -237,14 +232,12 @@ class GroupExchange:
 
         The journal must have these before the reply is sent.
         """
+        partner = self._partners.get(request.by)
         about = (request.archipelago, request.to)
-        if about != (self.news.archipelago, self.news.group):
+        if about != (self._archipelago, self._group.number) or partner is None:
             return None, []
         if request.digest != self._digest:
             return MigrantsReply(differs=True), []
-        partner = self._partners.get(request.by)
-        if partner is None:
-            return None, []
         partner.heard_s = now_s
         served: list[Served] = []
         if request.needed:

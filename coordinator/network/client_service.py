@@ -3,8 +3,8 @@
 import socket
 import threading
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
 from uuid import uuid4
@@ -23,7 +23,6 @@ from schema.wire.operator import (
     OperatorRequest,
     decode_operator_reply,
 )
-from schema.wire.status import Status
 
 _NOW = zenoh.ConsolidationMode.NONE
 _MOST_COORDINATORS = 1000
@@ -65,37 +64,6 @@ def ask_coordinators(
         who = f"none of {len(there)} coordinators" if there else "no coordinator"
         raise NetworkError(f"{connect}: {who} of fleet {fleet} replies{role}")
     return replies_of
-
-
-class Operator(AbstractContextManager["Operator"]):
-    """Client of a hub that asks its coordinators for their status."""
-
-    def __init__(self, connect: str, fleet: str, tls: Tls | None) -> None:
-        """Connect to a hub.
-
-        Raises:
-            NetworkError: there is none.
-        """
-        self._fleet = fleet
-        config = zenoh.Config.from_json5(client_config(connect, tls))
-        try:
-            self._session = open_session(config)
-        except zenoh.ZError:
-            raise NetworkError(why_no_hub(connect, tls)) from None
-
-    def statuses(self) -> Iterator[Status]:
-        """Yield the status of each coordinator that answers within a second."""
-        data = encode(OperatorRequest(uuid4().hex, 0, GetStatus()))
-        for member in coordinators(self._session, self._fleet, _STEP_S):
-            reply = reply_of(member, self._session, data, _STEP_S)
-            if reply is not None:
-                with suppress(MalformedMessage):
-                    status = decode_operator_reply(reply).status
-                    if status is not None:
-                        yield status
-
-    def __exit__(self, *_: object) -> None:
-        self._session.close()  # type: ignore[no-untyped-call]
 
 
 def coordinators(

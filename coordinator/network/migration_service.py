@@ -5,26 +5,25 @@ The network's threads only enqueue, and wake the main thread, which calls all me
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from queue import Empty, SimpleQueue
-from typing import TypeVar
+from queue import SimpleQueue
+from typing import Any
 
 import zenoh
 
-from coordinator.dispatch.faults import PeerFaults
+from coordinator.network.operator_service import OperatorQuery
 from schema.agent.topics import Member, announced_by_all, member_of, migrants_of_all
 from schema.errors import MalformedMessage
 from schema.limits import MIGRANTS_REQUEST_BYTES, MOST_PEERS, MOST_QUERIES
-from schema.wire.codec import decode, encode
-from schema.wire.migration import GroupNews, MigrantsRequest
+from schema.wire.codec import encode
+from schema.wire.migration import MigrantsRequest
 
-T = TypeVar("T")
 WAIT_S = 3.0
 """Time for the replies to a request; a process that keeps silent delays others [s]."""
 
 
 @dataclass(slots=True)
 class SentRequest:
-    """A request to all coordinators; the one that runs the group replies.
+    """A request to all coordinators, which has ended; the ones of the group replied.
 
     Attributes:
         replies: bytes, each with the name of the coordinator that sent them.
@@ -37,84 +36,76 @@ class SentRequest:
         """Keep a reply that a coordinator sent by its own key."""
         if reply.ok is None or len(self.replies) >= MOST_PEERS:
             return
-        key = str(reply.ok.key_expr)
+        key, replier = str(reply.ok.key_expr), reply.replier_id
         try:
             member = member_of(f"{key.rpartition('/')[0]}/alive")
         except MalformedMessage:
             return
-        replier = reply.replier_id
         is_own = replier is not None and str(replier.zid) == member.session
         if is_own and key == member.migrants:
             self.replies.append((member.name, reply.ok.payload.to_bytes()))
 
 
-@dataclass(frozen=True, slots=True)
-class ReceivedRequest:
-    """A request of another coordinator; call ``reply`` once."""
-
-    request: MigrantsRequest
-    query: zenoh.Query
-    key: str
-
-    def reply(self, data: bytes | None) -> None:
-        """Reply, or with None do not."""
-        with self.query as query:
-            if data is not None:
-                query.reply(self.key, data)
+Arrived = SentRequest | OperatorQuery | bytes
+"""What came: the end of a request, another coordinator's, or an announcement."""
 
 
 class MigrationService:
     """Requests for migrants and announcements, in both directions."""
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        me: Member,
-        wake: Callable[[], None],
-        faults: PeerFaults,
+        self, session: zenoh.Session, me: Member, wake: Callable[[], None]
     ) -> None:
         """Listen in a session; ``wake`` ends the wait of the main thread."""
         self._session, self._me = session, me
         self._wake = wake
-        self._faults = faults
-        self._queries: SimpleQueue[zenoh.Query] = SimpleQueue()
-        self._samples: SimpleQueue[zenoh.Sample] = SimpleQueue()
-        self._ended: SimpleQueue[SentRequest] = SimpleQueue()
+        self._arrived: SimpleQueue[Arrived] = SimpleQueue()
         self._declared = (
             session.declare_queryable(
-                me.migrants, self._enqueue(self._queries), complete=True
+                me.migrants,
+                self._enqueue(
+                    lambda data, query: OperatorQuery(data, query, me.migrants)
+                ),
+                complete=True,
             ),
             session.declare_subscriber(
-                announced_by_all(me.fleet), self._enqueue(self._samples)
+                announced_by_all(me.fleet), self._enqueue(lambda data, _sample: data)
             ),
         )
 
-    def _enqueue(self, queue: "SimpleQueue[T]") -> "zenoh.handlers.Callback[T]":
-        """Return a callback that keeps what comes, unless too much of it waits."""
+    def _enqueue(
+        self, read: Callable[[bytes, Any], Arrived]
+    ) -> "zenoh.handlers.Callback[Any]":
+        """Return a callback that keeps messages, unless too many wait."""
 
-        def put(one: T) -> None:
-            if queue.qsize() < MOST_QUERIES:
-                queue.put(one)
+        def put(message: Any) -> None:  # noqa: ANN401 - a query or a sample
+            payload = message.payload
+            is_short = payload is not None and len(payload) <= MIGRANTS_REQUEST_BYTES
+            if is_short and self._arrived.qsize() < MOST_QUERIES:
+                self._arrived.put(read(payload.to_bytes(), message))
                 self._wake()
 
         return zenoh.handlers.Callback(put, indirect=False)
 
     @property
     def has_arrived(self) -> bool:
-        """Whether something waits for the main thread."""
-        queues = (self._queries, self._samples, self._ended)
-        return not all(queue.empty() for queue in queues)
+        """Whether something waits for ``arrived``."""
+        return not self._arrived.empty()
 
-    def announce(self, news: GroupNews) -> None:
+    def arrived(self) -> list[Arrived]:
+        """Return what has come since the last call."""
+        return [self._arrived.get() for _ in range(self._arrived.qsize())]
+
+    def announce(self, news: bytes) -> None:
         """Publish an announcement, best effort."""
-        self._session.put(self._me.announced, encode(news))
+        self._session.put(self._me.announced, news)
 
     def ask(self, request: MigrantsRequest) -> None:
-        """Send a request; ``ended`` returns it, exactly once."""
+        """Send a request; ``arrived`` returns its end, exactly once."""
         sent = SentRequest(request)
 
         def end() -> None:
-            self._ended.put(sent)
+            self._arrived.put(sent)
             self._wake()
 
         self._session.get(
@@ -125,44 +116,3 @@ class MigrationService:
             target=zenoh.QueryTarget.ALL,
             consolidation=zenoh.ConsolidationMode.NONE,
         )
-
-    def ended(self) -> list[SentRequest]:
-        """Return the requests that have ended since the last call."""
-        return _taken(self._ended)
-
-    def received(self) -> list[ReceivedRequest]:
-        """Return the requests of other coordinators since the last call."""
-        received: list[ReceivedRequest] = []
-        for query in _taken(self._queries):
-            payload = query.payload
-            data = b"" if payload is None else payload.to_bytes()
-            try:
-                request = decode(MigrantsRequest, data, MIGRANTS_REQUEST_BYTES)
-            except MalformedMessage as error:
-                self._faults.note("malformed", "coordinators", str(error))
-                query.drop()  # type: ignore[no-untyped-call]
-            else:
-                received.append(ReceivedRequest(request, query, self._me.migrants))
-        return received
-
-    def news(self) -> list[GroupNews]:
-        """Return the announcements since the last call."""
-        news: list[GroupNews] = []
-        for sample in _taken(self._samples):
-            try:
-                data = sample.payload.to_bytes()
-                news.append(decode(GroupNews, data, MIGRANTS_REQUEST_BYTES))
-            except MalformedMessage as error:
-                self._faults.note("malformed", "coordinators", str(error))
-        return news
-
-
-def _taken(queue: "SimpleQueue[T]") -> list[T]:
-    """Return what waits in a queue."""
-    found: list[T] = []
-    try:
-        while len(found) < MOST_QUERIES:
-            found.append(queue.get_nowait())
-    except Empty:
-        pass
-    return found

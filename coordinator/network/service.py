@@ -236,7 +236,7 @@ class Network:
 
     def migration(self) -> MigrationService:
         """Open the connection to coordinators of other groups of islands."""
-        return MigrationService(self._session, self._me, self.wake, self.faults)
+        return MigrationService(self._session, self._me, self.wake)
 
     def _enqueue(self, key: str) -> "zenoh.handlers.Callback[zenoh.Query]":
         """Return a callback for the queries of a key; they may have wildcards."""

@@ -4,12 +4,14 @@ import time
 
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.groups.exchange import GroupExchange, MigrantsReply
-from coordinator.network.migration_service import MigrationService
+from coordinator.network.migration_service import MigrationService, SentRequest
+from coordinator.network.operator_service import OperatorQuery
 from coordinator.run.loop import Loop
 from schema.errors import MalformedMessage
-from schema.limits import MIGRANTS_BYTES
+from schema.limits import MIGRANTS_BYTES, MIGRANTS_REQUEST_BYTES
 from schema.tables.description import RunDetails
 from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.migration import MigrantsRequest
 
 
 def births_digest(details: RunDetails) -> bytes:
@@ -61,31 +63,47 @@ class GroupLink:
         """Answer other groups, take what they sent, and ask for more.
 
         Raises:
-            RevolveError: the run cannot continue; see ``Loop.receive``.
+            RevolveError: the run cannot continue; see ``Loop.act``.
         """
         self._now_s = now_s
-        exchange, loop, service = self.exchange, self._loop, self._service
-        for sent in service.ended():
-            replies: list[tuple[str, MigrantsReply]] = []
-            for name, data in sent.replies:
-                try:
-                    replies.append((name, decode(MigrantsReply, data, MIGRANTS_BYTES)))
-                except MalformedMessage as error:
-                    self._faults.note("migrants", name, str(error))
-            taken = exchange.take(sent.request, replies, now_s)
-            for name, why in taken.faults:
-                self._faults.note("migrants", name, why)
-            loop.receive(taken.events)
-        if loop.is_finished and not self._was_finished:
+        exchange, service = self.exchange, self._service
+        for each in service.arrived():
+            if isinstance(each, SentRequest):
+                self._take(each)
+            elif isinstance(each, OperatorQuery):
+                self._answer(each)
+            else:
+                exchange.announced(each)
+        if self._loop.is_finished and not self._was_finished:
             self._was_finished = True
             exchange.finish()
-        for query in service.received():
-            reply, served = exchange.answer(query.request, now_s)
-            loop.receive(served)
-            query.reply(None if reply is None else encode(reply))
-        for news in service.news():
-            exchange.announced(news)
         if exchange.has_news():
             service.announce(exchange.news)
         for request in exchange.requests(now_s):
             service.ask(request)
+
+    def _take(self, sent: SentRequest) -> None:
+        """Take the replies to a request."""
+        replies: list[tuple[str, MigrantsReply]] = []
+        faults: list[tuple[str, str]] = []
+        for name, data in sent.replies:
+            try:
+                replies.append((name, decode(MigrantsReply, data, MIGRANTS_BYTES)))
+            except MalformedMessage as error:
+                faults.append((name, str(error)))
+        events, false = self.exchange.take(sent.request, replies, self._now_s)
+        for name, why in (*faults, *false):
+            self._faults.note("migrants", name, why)
+        self._loop.take(events)
+
+    def _answer(self, query: OperatorQuery) -> None:
+        """Answer another coordinator, if it asks this group."""
+        replies: list[bytes] = []
+        try:
+            request = decode(MigrantsRequest, query.data, MIGRANTS_REQUEST_BYTES)
+            reply, served = self.exchange.answer(request, self._now_s)
+            self._loop.take(served)
+            replies += [] if reply is None else [encode(reply)]
+        except MalformedMessage as error:
+            self._faults.note("malformed", "coordinators", str(error))
+        query.reply(*replies)

@@ -137,7 +137,7 @@ class Loop:
                 self._requests.send(request)
         self._unanswered.clear()
         self.shard_requests.send_noted()
-        self._take([self._learners.answer(each) for each in asks])
+        self.take([self._learners.answer(each) for each in asks])
 
     def begin(self) -> None:
         """Start the islands; their requests are only noted."""
@@ -217,7 +217,7 @@ class Loop:
                     step = event.advance.step
                     self.snapshot_store.write(event.island, step, snapshot)
                 events.append(event)
-        self._take(events)
+        self.take(events)
 
     def leave(self) -> None:
         """Drop all open requests."""
@@ -231,18 +231,14 @@ class Loop:
         """
         if not isinstance(self.islands.get(event.island), Arena):
             raise UnexpectedEvent(f"no arena {event.island}: {event}")
-        self._take([event])
+        self.take([event])
 
-    def receive(self, events: Sequence[MigrationEvent | Served]) -> None:
-        """Take what other groups of islands sent; the journal has it on return.
+    def take(self, events: Sequence[JournalledEvent]) -> None:
+        """Store events, then act on them, and on the answers of learners.
 
         Raises:
-            ExperimentError, RunFolderError, RunPaused: as of ``act``.
+            RevolveError: as of ``act``.
         """
-        self._take(events)
-
-    def _take(self, events: Sequence[JournalledEvent]) -> None:
-        """Store events, then act on them, and on the answers of learners."""
         while events:
             # A process that was suspended while another took over must not write.
             self.confirm()

@@ -48,7 +48,8 @@ class Member:
         trial: key on which ``revolve doctor`` tries the rights of a certificate.
         migrants: key that takes one ``MigrantsRequest`` of a coordinator that runs
             another group of islands, and gives the reply.
-        announced: key on which a ``GroupNews`` appears when islands have sent migrants.
+        announced: key on which 8 bytes appear, which name a group of islands, when it
+            has sent migrants.
     """
 
     fleet: str

@@ -9,8 +9,6 @@ from schema.limits import LONGEST_NAME
 from schema.robot.ids import IslandNumber
 from schema.wire.codec import Message
 
-_Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
-
 
 class Needed(Message, frozen=True):
     """What an island needs next of an island of another group.
@@ -38,20 +36,8 @@ class MigrantsRequest(Message, frozen=True):
             never need anything else if it is empty.
     """
 
-    archipelago: _Name
+    archipelago: Annotated[str, Meta(max_length=LONGEST_NAME)]
     digest: bytes
     by: Count
     to: Count
     needed: tuple[Needed, ...]
-
-
-class GroupNews(Message, frozen=True):
-    """Announcement: a group has sent migrants, or has started.
-
-    Attributes:
-        archipelago: as of ``MigrantsRequest``.
-        group: number of the group.
-    """
-
-    archipelago: _Name
-    group: Count

@@ -9,8 +9,8 @@ import zenoh
 
 from coordinator.groups.exchange import MigrantsReply
 from coordinator.islands.events import Immigrated
-from coordinator.network.service import session_config
 from schema.agent.network import client_config
+from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.limits import MIGRANTS_REQUEST_BYTES
 from schema.wire.codec import decode, encode
