@@ -75,10 +75,7 @@ def execute(
                 return False
             watch(run)
             ends = fleet.listen(0.0, float(turns)).get(run.loop.client, ())
-            if run.recovery is None:
-                run.loop.act(float(turns), ends)
-            else:
-                run.recover(ends)
+            run.act(float(turns), ends)
             turns += 1
         run.finish()
     finally:
