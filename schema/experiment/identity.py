@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from schema.experiment.section import AtLeastOne, Count, Section
 from schema.robot.ids import NOBODY, BirthId
@@ -44,7 +44,7 @@ NO_IDENTITY = Identity(NO_ORIGIN, NOBODY, 0)
 """Identity outside of a run: of a robot file or a benchmark."""
 
 
-class Group(Section, frozen=True):
+class Group(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Group of islands that one coordinator runs: those with number = i modulo ``of``.
 
     Attributes:
