@@ -213,7 +213,7 @@ def _births_of(options: argparse.Namespace) -> list[str]:
 
 def _resume(options: argparse.Namespace) -> int:
     folder = Path(options.folder)
-    groups = groups_below(folder)
+    groups = groups_below(folder, options.births)
     runs = groups or [folder]
     # First: a finished run needs none of its plug-ins.
     if options.births is None and (code := finished_code(folder, groups)) is not None:

@@ -47,6 +47,11 @@ Main = Callable[[list[str]], int]
 Commands = dict[Path, tuple[RunDetails, list[str]]]
 """Description of each group and the command of its coordinator, by folder."""
 
+_WITH_VALUE = (
+    *("--speed", "--arena-workers", "--audit", "--on-quarantine", "--fleet"),
+    *("--tls-ca", "--tls-certificate", "--tls-key"),
+)
+"""Flags with a value that each group's coordinator gets."""
 _NO_STATUS = Status((), 0, 0, 0.0)
 _TURN_S = 1.0
 _HUB_S = 30.0
@@ -73,8 +78,10 @@ def archipelago_of(campaign: Campaign) -> str:
     return births_digest(details).hex()
 
 
-def groups_below(folder: Path) -> list[Path]:
+def groups_below(folder: Path, births: int | None = None) -> list[Path]:
     """Return the folders of all groups of a folder's archipelago; none without any.
+
+    ``births``: number that all are to get; if a kill came in between, some have it.
 
     Raises:
         RunFolderError: a group is missing, there is another run, or they differ.
@@ -86,9 +93,11 @@ def groups_below(folder: Path) -> list[Path]:
     first = known[folders[0]]
     for path, details in known.items():
         own = structs.replace(details.group, number=first.group.number)
-        if structs.replace(details, group=own) != first:
+        document = details.document if births is None else first.document
+        if structs.replace(details, group=own, document=document) != first:
             raise RunFolderError(
-                f"{path}: must be a group of the archipelago of {folders[0]}"
+                f"{path}: must be a group of the archipelago of {folders[0]}, with its "
+                "number of births"
             )
     found = {details.group.number: path for path, details in known.items()}
     for number in range(first.group.of):
@@ -200,7 +209,7 @@ def _flags(deployment: Deployment, address: str) -> list[str]:
     """Return the flags of a group's coordinator: those that a run has in common."""
     words = list(deployment.resume_flags)
     flags = ["--connect", address, "--give-up-after", f"{_HUB_S:g}", "--quiet"]
-    for name in ("--speed", "--arena-workers", "--audit", "--on-quarantine", "--fleet"):
+    for name in _WITH_VALUE:
         if name in words:
             flags += [name, words[words.index(name) + 1]]
     return [*flags, *(w for w in ("--allow-drift", "--fsync") if w in words)]

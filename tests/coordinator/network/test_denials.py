@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -10,10 +11,14 @@ import zenoh
 
 from coordinator.cluster.kit import ClusterKit, Kit
 from coordinator.network.hub_service import watch_unlisted
+from coordinator.network.migration_service import MigrationService, SentRequest
+from coordinator.network.operator_service import OperatorQuery
 from schema.agent.access import read_certificates
 from schema.agent.network import Tls, client_config, hub_config
-from schema.agent.service import HubWatch, usable
+from schema.agent.service import HubWatch, session_config, usable
 from schema.agent.topics import Member, Role
+from schema.wire.codec import decode
+from schema.wire.migration import MigrantsRequest, Needed
 from tests.system.workspace import free_address, wait_until
 
 pytestmark = pytest.mark.system
@@ -41,6 +46,7 @@ class Lab:
         for name in ("good", "gone", "unlisted"):
             kit.add(name, "worker")
         kit.add("chief", "coordinator")
+        kit.add("second", "coordinator")
         kit.add("looker", "viewer")
         kit.revoke("gone")
         listed = read_certificates(folder / "lab" / "access.json")
@@ -139,3 +145,46 @@ def test_the_hub_names_certificates_that_it_does_not_list(
     wait_until(lambda: len(lines) >= 2, "both are named")
     told = [line.partition(" is not in --access")[0] for line in lines]
     assert told == ["certificate 'gone'", "certificate 'unlisted'"]
+
+
+REQUEST = MigrantsRequest("name", b"digest", 0, 1, (Needed(1, 0, 3),))
+
+
+def migration(lab: Lab, stack: ExitStack, name: str, role: Role) -> MigrationService:
+    """Open a session with a certificate, as one of a coordinator would."""
+    separator = "." if role == "coordinator" else "-"
+    me = Member("lab", role, f"{name}{separator}0.2")
+    config = session_config(client_config(lab.address, lab.tls(name)), me)
+    return MigrationService(
+        stack.enter_context(zenoh.open(config)), me, wake=lambda: None
+    )
+
+
+def test_only_coordinators_ask_each_other_for_migrants(lab: Lab) -> None:
+    with ExitStack() as stack:
+        one, other = (
+            migration(lab, stack, name, "coordinator") for name in ("chief", "second")
+        )
+        worker = migration(lab, stack, "good", "worker")
+
+        def asked(service: MigrationService) -> list[tuple[str, bytes]]:
+            """Ask; return the replies that the hub lets pass."""
+            service.ask(REQUEST)
+            while True:
+                wait_until(lambda: service.has_arrived or other.has_arrived, "a reply")
+                for each in other.arrived() if service is not other else []:
+                    if isinstance(each, OperatorQuery):
+                        assert decode(MigrantsRequest, each.data, 1000) == REQUEST
+                        each.reply(b"them")
+                for each in service.arrived():
+                    if isinstance(each, SentRequest):
+                        return each.replies
+                    if isinstance(each, OperatorQuery):
+                        each.reply()
+
+        assert asked(one) == [("second.0.2", b"them")]
+        assert asked(worker) == []
+        worker.announce(b"false")
+        other.announce(b"news")
+        wait_until(lambda: one.has_arrived, "an announcement")
+        assert one.arrived() == [b"news"]
