@@ -243,7 +243,8 @@ def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int])
         tell_user(f"{error}; to resume: {command_line('resume', folder, *flags)}")
         return 1
     except KeyboardInterrupt:
-        if is_campaign(folder) or holds_run(folder) or groups_below(folder):
+        begun = (folder / "group-0").exists()
+        if is_campaign(folder) or holds_run(folder) or begun:
             advise(stopped(folder, flags))
         tell_stopped()
         return STOPPED

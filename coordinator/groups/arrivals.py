@@ -11,7 +11,7 @@ from coordinator.evolution.breeding import Individual
 from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
 from coordinator.islands.events import Immigrated, MigrationEvent, source_of
 from coordinator.islands.migration import Neighbours
-from schema.errors import InvalidRobot, MalformedMessage
+from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment
 from schema.experiment.migration import migrant_count
 from schema.limits import MOST_NUMBER
@@ -49,7 +49,7 @@ def check_arrival(
     for one in event.migrants:
         try:
             _check_migrant(one, islands, encoding_of(islands[event.source]))
-        except InvalidRobot as error:
+        except (InvalidRobot, ExperimentError) as error:  # of own code, too
             why = f"migrant {one.birth.name}: {error}"
             raise _false(needed, why) from None
 

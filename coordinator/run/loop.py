@@ -264,6 +264,8 @@ class Loop:
         if isinstance(event, Served):
             self.outbox.served.add(event.group)
             return []
+        if isinstance(event, NeighbourClosed):
+            self.shard_requests.keep_snapshots()
         if not isinstance(event, Audited):
             return self._tell(island_of(event), event)
         for record in audit_records(event):
