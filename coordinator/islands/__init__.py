@@ -1,1 +1,1 @@
-"""State machines of off-line islands and of migration; events of all islands."""
+"""State machines of off-line islands and of migration, also between coordinators."""

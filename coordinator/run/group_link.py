@@ -3,7 +3,7 @@
 import time
 
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.groups.exchange import GroupExchange, MigrantsReply
+from coordinator.islands.exchange import GroupExchange, MigrantsReply
 from coordinator.network.migration_service import MigrationService, SentRequest
 from coordinator.network.operator_service import OperatorQuery
 from coordinator.run.loop import Loop

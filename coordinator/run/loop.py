@@ -13,7 +13,6 @@ from itertools import chain
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import Deliver
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.groups.outbox import Outbox
 from coordinator.islands.events import (
     Advanced,
     Answered,
@@ -40,6 +39,7 @@ from coordinator.islands.events import (
     brief,
 )
 from coordinator.islands.island import Island
+from coordinator.islands.outbox import Outbox
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
 from coordinator.run.learners import Learners
 from coordinator.run.requests import Key, Requests, island_of, key_of

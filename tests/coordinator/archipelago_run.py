@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from coordinator.arena.arena import Arena
-from coordinator.groups.outbox import Outbox
 from coordinator.islands.events import (
     ArenaCommand,
     Ask,
@@ -22,6 +21,7 @@ from coordinator.islands.events import (
     arrival,
 )
 from coordinator.islands.island import Island
+from coordinator.islands.outbox import Outbox
 from coordinator.run.archipelago import archipelago
 from coordinator.run.learners import Learners
 from schema.experiment.check import check_experiment

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from coordinator.groups.exchange import MigrantsReply
 from coordinator.islands.events import Immigrated
+from coordinator.islands.exchange import MigrantsReply
 from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import Protocol
 
-from coordinator.groups.arrivals import check_arrival
-from coordinator.groups.outbox import Outbox
+from coordinator.islands.arrivals import check_arrival
 from coordinator.islands.events import MigrationEvent, Served, source_of
 from coordinator.islands.migration import MigrationEpochs
+from coordinator.islands.outbox import Outbox
 from schema.errors import MalformedMessage
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Group

@@ -1,1 +1,0 @@
-"""Exchange of migrants between groups of islands, which several coordinators run."""
