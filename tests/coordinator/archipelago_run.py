@@ -15,6 +15,7 @@ from coordinator.islands.events import (
     Evaluated,
     Finish,
     IslandCommand,
+    MigrationEvent,
     NeighbourClosed,
     Record,
     Started,
@@ -158,7 +159,7 @@ class ArchipelagoRun:
                         self.waiting.append((number, command))
                         continue
                     case Emigrate():
-                        sent = [arrival(command)]
+                        sent: list[MigrationEvent] = [arrival(command)]
                     case Finish(island, neighbours):
                         sent = [NeighbourClosed(to, island) for to in neighbours]
                     case _:
