@@ -87,7 +87,12 @@ def about_arenas(run: RunStatus) -> str:
 
 
 def missing_agents(status: Status) -> list[str]:
-    """Return the kinds of agents that a coordinator has none of, in the plural."""
+    """Return the kinds of agents that a coordinator lacks, in the plural.
+
+    A run that is finished, and keeps its migrants for other groups, needs none.
+    """
+    if all(run.state == "finished" for run in status.runs):
+        return []
     counts = {"workers": status.workers, "analyzers": status.analyzers}
     return [kind for kind, count in counts.items() if not count]
 
