@@ -40,6 +40,10 @@ VALUE_BYTES = 1 * MIB
 """The argument or the value of a call of a user's function."""
 ADVANCE_BYTES = 256 * MIB
 """An answer about an arena, of any arena."""
+BUNDLE_BYTES = 257 * MIB
+"""Requests to an agent, or answers, that travel together."""
+MOST_BUNDLED = 16
+"""Jobs that travel together."""
 INFO_BYTES = 128 * KIB
 """An agent's description of itself, with its predecessors' deaths."""
 LIVE_BYTES = 64 * MIB

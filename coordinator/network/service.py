@@ -48,8 +48,16 @@ from schema.agent.service import (
 )
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
-from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, printable
-from schema.wire.codec import fingerprint
+from schema.limits import (
+    BUNDLE_BYTES,
+    KIB,
+    LONGEST_REASON,
+    MOST_ASKED_INFOS,
+    MOST_BUNDLED,
+    printable,
+)
+from schema.wire.codec import decode, encode, fingerprint
+from schema.wire.messages import Replies, Reply
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
@@ -57,6 +65,8 @@ _MOST_EVENTS = 1000
 _MOST_NEWS = 10_000
 _LOOK_S = 1.0
 _NEARLY = 0.99
+# A job that is larger does not wait for others.
+_LARGE = 64 * KIB
 # Properties that are malformed are hardly better after a second.
 _MALFORMED_SILENCES = 5
 _THREAD = threading.local()
@@ -64,25 +74,31 @@ _THREAD = threading.local()
 
 @dataclass(slots=True)
 class _Asked:
-    """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``.
-
-    ``took_s`` is the time from sending it to its reply, ``wait_s`` the longest [s].
+    """A query to an agent: jobs that travel together, or one for its ``AgentInfo``.
 
     Any process can serve the agent's key. All that do get the query, so that none can
-    keep it from the agent, and only the reply of the agent's own session counts.
+    keep it from the agent, and only replies of the agent's own session count.
+
+    Attributes:
+        open: numbers of the jobs without a reply, by their places; none for the info.
+        wait_s: the longest that it takes [s].
     """
 
     member: Member
-    number: int
+    open: dict[int, int]
     inbox: "Inbox[_News]"
     wait_s: float
-    reply: zenoh.Reply | None = None
-    has_stray: bool = False
     asked_s: float = field(default_factory=time.monotonic)
-    took_s: float = 0.0
+    is_info: bool = field(init=False)
+    _awaited: int = field(init=False)
+    _has_stray: bool = False
+
+    def __post_init__(self) -> None:
+        self.is_info = not self.open
+        self._awaited = max(1, len(self.open))
 
     def take(self, reply: zenoh.Reply) -> None:
-        """Pass the first reply on at once: another process may never end its own."""
+        """Pass a reply on at once: another process may never end its own."""
         _keep_thread_state()
         replier = reply.replier_id
         took_s = time.monotonic() - self.asked_s
@@ -90,30 +106,49 @@ class _Asked:
             return  # of the engine itself or of the hub, after the wait
         if str(replier.zid) != self.member.session:
             self._pass_on("foreign")
-        elif self.reply is not None:
+        elif not self._awaited:
             self._pass_on("late")
         else:
-            self.reply, self.took_s = reply, took_s
-            self.inbox.put(self)
+            # Never more replies than jobs.
+            self._awaited -= 1
+            self.inbox.put(_Heard(self, took_s, reply))
 
     def end(self) -> None:
-        """End the query; called exactly once, with a reply or without."""
-        if self.reply is None:
-            self.took_s = time.monotonic() - self.asked_s
-            self.inbox.put(self)
-
-    @property
-    def is_expired(self) -> bool:
-        """Whether it ended without a reply because its time was over."""
-        # The hub measures the time by itself.
-        return self.reply is None and self.took_s >= _NEARLY * self.wait_s
+        """End the query; called exactly once, with replies or without."""
+        if self._awaited:
+            self.inbox.put(_Heard(self, time.monotonic() - self.asked_s))
 
     def _pass_on(self, kind: FaultKind) -> None:
         """Report a reply that does not count, once for each query."""
-        if not self.has_stray:
-            self.has_stray = True
-            about = "properties" if self.number < 0 else f"job {self.number}"
+        if not self._has_stray:
+            self._has_stray = True
+            numbers = ", ".join(map(str, self.open.values()))
+            about = f"job {numbers}" if numbers else "properties"
             self.inbox.put((kind, self.member.name, about))
+
+
+@dataclass(frozen=True, slots=True)
+class _Heard:
+    """A reply to a query after some time [s], or its end."""
+
+    asked: _Asked
+    took_s: float
+    reply: zenoh.Reply | None = None
+
+    @property
+    def is_expired(self) -> bool:
+        """Whether the query ended because its time was over."""
+        # The hub measures the time by itself.
+        return self.reply is None and self.took_s >= _NEARLY * self.asked.wait_s
+
+
+@dataclass(slots=True)
+class _Unsent:
+    """Jobs that will travel to an agent together; ``wait_s``: the longest wait [s]."""
+
+    numbers: list[int] = field(default_factory=list)
+    payloads: list[bytes] = field(default_factory=list)
+    wait_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +161,7 @@ class _Queried:
 
 _Stray = tuple[FaultKind, str, str]
 """A reply that does not count, as ``PeerFaults.note`` takes it."""
-_Told = _Asked | _Stray | _Queried | zenoh.Sample
+_Told = _Heard | _Stray | _Queried | zenoh.Sample
 _News = _Told | None
 """What ``receive`` waits for; None only ends its wait."""
 
@@ -186,6 +221,7 @@ class Network:
         self._asked_infos: set[Member] = set()
         self.queries = Queries(self._me.state, self.faults)
         self._outlet = Outlet()
+        self._unsent: dict[str, _Unsent] = {}
 
     @property
     def refused(self) -> Mapping[str, str]:
@@ -256,15 +292,28 @@ class Network:
     def send(self, number: int, agent: str, payload: bytes, wait_s: float, /) -> None:
         """Send a job to an agent; ``receive`` returns exactly one ``Returned`` for it.
 
+        It travels with others to that agent at the next ``receive`` or before.
         ``agent``: that has joined; if it has left since, the job is lost. ``wait_s``:
         time without a reply after which its outcome is "expired" [s].
         """
-        if member := self._membership.joined.get(agent):
-            asked = _Asked(member, number, self._inbox, wait_s)
-            self._ask(asked, member.jobs, payload)
+        unsent = self._unsent.setdefault(agent, _Unsent())
+        unsent.numbers.append(number)
+        unsent.payloads.append(payload)
+        unsent.wait_s = max(unsent.wait_s, wait_s)
+        if len(unsent.numbers) == MOST_BUNDLED or len(payload) > _LARGE:
+            self._dispatch(agent)
+
+    def _dispatch(self, agent: str) -> None:
+        """Send the jobs of an agent that are not sent."""
+        unsent = self._unsent.pop(agent)
+        member = self._membership.joined.get(agent)
+        to = member or Member(self._me.fleet, "worker", agent)
+        jobs = dict(enumerate(unsent.numbers))
+        asked = _Asked(to, jobs, self._inbox, unsent.wait_s)
+        if member is None:
+            asked.end()
         else:
-            gone = Member(self._me.fleet, "worker", agent)
-            _Asked(gone, number, self._inbox, wait_s).end()
+            self._ask(asked, member.jobs, encode(unsent.payloads))
 
     def cancel(self, agent: str, payload: bytes) -> None:
         """Tell an agent that a job is no longer wanted; it may have started it."""
@@ -296,6 +345,8 @@ class Network:
         Raises:
             HubLost: no hub has answered for too long.
         """
+        for agent in [*self._unsent]:
+            self._dispatch(agent)
         now_s = time.monotonic()
         if not self._is_hub and now_s >= self._look_s:
             self._look_s = now_s + _LOOK_S
@@ -340,11 +391,11 @@ class Network:
         try:
             if isinstance(news, zenoh.Sample):
                 return self._token_changed(news)
-            if news.number < 0:
-                return self._introduced(news)
+            if news.asked.is_info:
+                return self._introduced(news.asked.member, news.reply)
             return self._returned(news)
         except MalformedMessage as error:
-            peer = news.member.name if isinstance(news, _Asked) else "a token"
+            peer = news.asked.member.name if isinstance(news, _Heard) else "a token"
             self.faults.note("malformed", peer, str(error))
             return []
 
@@ -365,13 +416,15 @@ class Network:
             self._info_queue.add_again(member, 1, time.monotonic())
             return
         self._asked_infos.add(member)
-        asked = _Asked(member, -1, self._inbox, ASK_TIMEOUT_S)
+        asked = _Asked(member, {}, self._inbox, ASK_TIMEOUT_S)
         # An agent of another version tells its user.
         self._ask(asked, member.info, wire_version().encode())
 
-    def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
+    def _introduced(
+        self, member: Member, reply: zenoh.Reply | None
+    ) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""
-        member, reply, membership = asked.member, asked.reply, self._membership
+        membership = self._membership
         self._asked_infos.discard(member)
         if reply is None or reply.ok is None:
             # It is alive but does not answer (yet).
@@ -395,26 +448,47 @@ class Network:
             self.faults.note("refused", member.name, self.refused[member.name])
         return events
 
-    def _returned(self, asked: _Asked) -> list[DispatchEvent]:
-        number, agent, reply = asked.number, asked.member.name, asked.reply
+    def _returned(self, heard: _Heard) -> list[DispatchEvent]:
+        """Return the outcomes of the jobs that a reply is about."""
+        asked, reply = heard.asked, heard.reply
+        agent, took_s = asked.member.name, heard.took_s
         if reply is None:
-            if agent in self._membership.joined:
+            lost = [asked.open.pop(place) for place in [*asked.open]]
+            if lost and agent in self._membership.joined:
                 # It may be gone although its token is not: another process can
                 # declare the same one.
                 self._info_queue.add(asked.member)
-            if asked.is_expired:
-                return [Returned(number, agent, "expired", took_s=asked.took_s)]
-            return [Returned(number, agent, "lost")]
-        if reply.ok is not None:
-            answer = reply.ok.payload.to_bytes()
-            return [Returned(number, agent, "ok", answer, took_s=asked.took_s)]
-        assert reply.err is not None
-        told = reply.err.payload.to_bytes()[: 4 * LONGEST_REASON].decode(
-            "utf-8", "replace"
-        )
-        outcome, text = _outcome(told)
-        reason = printable(text, LONGEST_REASON) or "no reason given"
-        return [Returned(number, agent, outcome, reason=reason)]
+            if heard.is_expired:
+                return [Returned(n, agent, "expired", took_s=took_s) for n in lost]
+            return [Returned(number, agent, "lost") for number in lost]
+        if reply.err is not None:
+            told = reply.err.payload.to_bytes()[: 4 * LONGEST_REASON]
+            why = told.decode("utf-8", "replace")
+            replies = [Reply(place, reason=why) for place in asked.open]
+        else:
+            assert reply.ok is not None
+            replies = _replies(reply.ok.payload.to_bytes(), asked.open)
+        events: list[DispatchEvent] = []
+        for each in replies:
+            number = asked.open.pop(each.place, None)
+            if number is None:
+                self.faults.note("late", agent, f"place {each.place}")
+            elif each.answer:
+                ok = Returned(number, agent, "ok", each.answer, took_s=took_s)
+                events.append(ok)
+            else:
+                outcome, text = _outcome(each.reason)
+                reason = printable(text, LONGEST_REASON) or "no reason given"
+                events.append(Returned(number, agent, outcome, reason=reason))
+        return events
+
+
+def _replies(data: bytes, places: Iterable[int]) -> list[Reply]:
+    """Return what a reply says of jobs; malformed bytes are the answer to each."""
+    try:
+        return decode(Replies, data, BUNDLE_BYTES)
+    except MalformedMessage:
+        return [Reply(place, b"?") for place in places]
 
 
 def _keep_thread_state() -> None:

@@ -33,7 +33,7 @@ from schema.limits import (
 from schema.plugins.source import check_plugins
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode, encode, fingerprint
-from schema.wire.messages import AgentInfo, Answer, Request, Result, RunningJob
+from schema.wire.messages import AgentInfo, Answer, Reply, Request, Result, RunningJob
 
 _MOST_REMEMBERED = 1000
 LONG_S = 60.0
@@ -66,14 +66,6 @@ class ReplyCounts:
     skipped: int = 0
     cancels: int = 0
     crowd: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Reply:
-    """An answer, or the reason for the lack of one."""
-
-    answer: bytes = b""
-    reason: str = ""
 
 
 Compute = Callable[[Request], Result]
@@ -136,8 +128,8 @@ class Server:
             return
         _remember(data, None, self._cancelled)
 
-    def reply(self, data: bytes) -> Reply:
-        """Return the reply to any bytes."""
+    def reply(self, data: bytes, place: int = 0) -> Reply:
+        """Return the reply to any bytes, which had a place among others."""
         try:
             is_analyzer = self.agent.role == "analyzer"
             most = REQUEST_BYTES if is_analyzer else ADVANCE_REQUEST_BYTES
@@ -146,12 +138,12 @@ class Server:
             name = (request.run, request.epoch, request.number)
             task = RunningJob(self.agent.name, *name, fingerprint(data))
             if known := self._known(task, request):
-                return Reply(known)
+                return Reply(place, known)
             # A job that comes again is wanted, whatever cancelled it before.
             if task.request in self._cancelled and task.request not in self._skipped:
                 _remember(task.request, None, self._skipped)
                 self.counts.skipped += 1
-                return Reply(reason=CANCELLED)
+                return Reply(place, reason=CANCELLED)
             began_s = time.monotonic()
             self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
@@ -163,7 +155,7 @@ class Server:
             reason = str(error) if is_ours else error_text(error)
             if isinstance(error, UnknownPlugin | PluginDiffers):
                 reason = f"{UNFIT}{reason}"
-            return Reply(reason=printable(reason, LONGEST_REASON))
+            return Reply(place, reason=printable(reason, LONGEST_REASON))
         finally:
             self.watch.end()
         self.counts.answered += 1
@@ -172,7 +164,7 @@ class Server:
             _remember(arena, (task, answered), self._advances, self.agent.shards)
         elif time.monotonic() - began_s >= LONG_S:
             _remember(task, answered, self._answers, _MOST_LONG)
-        return Reply(answered)
+        return Reply(place, answered)
 
     def _known(self, task: RunningJob, request: Request) -> bytes | None:
         """Return the answer to a request if it is kept."""

@@ -16,12 +16,11 @@ from collections.abc import Callable, Collection, Iterable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
-from queue import Empty
 from typing import Any
 
 import zenoh
 
-from schema.agent.inbox import FairQueue, Inbox
+from schema.agent.inbox import Inbox
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.machine import (
     memory_bytes,
@@ -39,13 +38,11 @@ from schema.agent.supervisor import (
     stop_with_parent,
 )
 from schema.agent.topics import Member, check_name, unique_name
+from schema.agent.waiting_jobs import WaitingJobs
 from schema.errors import NetworkError, counted
 from schema.limits import MOST_SHOWN, printable
 from schema.plugins.permission import allow
 
-_POLL_S = 0.2
-# Queries that are taken before a job is done.
-_MOST_QUERIES = 1000
 _RETRY_S = 0.3
 # Between two messages to this process itself, and two looks why a hub refuses it.
 _BETWEEN_S, _TELL_AGAIN_S = 0.02, 10.0
@@ -394,6 +391,9 @@ def _serve_session(
 ) -> None:
     inbox: Inbox[zenoh.Query] = Inbox()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)
+    # Replies under a declared key are shorter and faster to handle at the hub.
+    jobs = session.declare_keyexpr(me.jobs)
+    waiting = WaitingJobs(jobs, server.counts)
 
     def reply_info(query: zenoh.Query) -> None:
         with query:
@@ -407,6 +407,7 @@ def _serve_session(
     def look() -> None:
         while not stop.wait(LOOK_S):
             server.look()
+            waiting.send_replies()
 
     threading.Thread(target=look, daemon=True).start()
     # The token comes last: a coordinator that sees it sends jobs at once.
@@ -421,56 +422,16 @@ def _serve_session(
         session.liveliness().declare_token(me.alive),
     ):
         hub.look(session, me)
-        turns: FairQueue[zenoh.Query] = FairQueue()
-        # Replies under a declared key are shorter and faster to handle at the hub.
-        jobs = session.declare_keyexpr(me.jobs)
         while not stop.is_set():
-            if not _queue_all(inbox, turns, server.counts):
+            if not waiting.take_all(inbox):
                 if not stop.is_set():
                     hub.look(session, me)
                 continue
             if hub.is_lost:
                 hub.look(session, me)
-            began_s = time.monotonic()
-            with turns.take() as query:
-                _answer(query, server, jobs, hub)
-            turns.spent(time.monotonic() - began_s)
-    _queue_all(inbox, turns, server.counts)
-    while turns:
-        with turns.take():
-            pass  # a query that ends without a reply is lost for its coordinator
-
-
-def _queue_all(
-    inbox: Inbox[zenoh.Query], turns: FairQueue[zenoh.Query], counts: ReplyCounts
-) -> bool:
-    """Move all queries that arrived to the queue; return whether any waits."""
-    try:
-        # Limited: jobs are done even if queries never stop coming.
-        for _ in range(_MOST_QUERIES):
-            # Wait only while there is nothing to do.
-            query = inbox.get_nowait() if turns else inbox.get(_POLL_S)
-            sender, payload = query.attachment, query.payload
-            source = sender.to_bytes()[:MOST_SHOWN] if sender else b""
-            size = len(payload) if payload else 0
-            for dropped in turns.put(source, query, size):
-                counts.crowd += 1
-                dropped.drop()  # type: ignore[no-untyped-call]
-    except Empty:
-        pass
-    return bool(turns)
-
-
-def _answer(
-    query: zenoh.Query, server: Server, jobs: zenoh.KeyExpr, hub: HubWatch
-) -> None:
-    """Reply with the answer, or with the reason why there is none."""
-    payload = query.payload
-    reply = server.reply(b"" if payload is None else payload.to_bytes())
-    if reply.reason:
-        if reply.reason.startswith(UNFIT):
-            why = reply.reason.removeprefix(UNFIT)
-            hub.refused(f"refused a run, and gets no more jobs of it: {why}")
-        query.reply_err(reply.reason)
-    else:
-        query.reply(jobs, reply.answer)
+            reply = waiting.do_next(server)
+            if reply.reason.startswith(UNFIT):
+                why = reply.reason.removeprefix(UNFIT)
+                hub.refused(f"refused a run, and gets no more jobs of it: {why}")
+        waiting.take_all(inbox)
+        waiting.drop_all()

@@ -10,6 +10,7 @@ from msgspec import Meta
 from schema.experiment.identity import NO_ORIGIN, Origin
 from schema.experiment.section import Count
 from schema.limits import (
+    MOST_BUNDLED,
     MOST_CORES,
     MOST_DEATHS,
     MOST_EPOCH,
@@ -33,6 +34,8 @@ GenomeBytes = Annotated[bytes, Meta(max_length=ROBOT_BYTES)]
 Packed = Annotated[bytes, Meta(max_length=VALUE_BYTES)]
 """Plain value, by ``schema.wire.calls.pack_value``."""
 RunName = Annotated[str, Meta(min_length=1, max_length=MOST_RUN_NAME)]
+Jobs = Annotated[list[bytes], Meta(min_length=1, max_length=MOST_BUNDLED)]
+"""What travels to an agent: the bytes of requests, which it does in this order."""
 
 
 class Breed(Message, frozen=True, tag="breed"):
@@ -231,6 +234,24 @@ class Answer(Message, frozen=True):
     number: Count
     wall_s: WallTime
     result: Result
+
+
+class Reply(Message, frozen=True, array_like=True):
+    """What an agent replies to one of the jobs that it got together.
+
+    Attributes:
+        place: of its request among them, from 0.
+        answer: bytes of the ``Answer``; empty without one.
+        reason: why there is none; empty with one.
+    """
+
+    place: Annotated[int, Meta(ge=0, lt=MOST_BUNDLED)]
+    answer: bytes = b""
+    reason: str = ""
+
+
+Replies = Annotated[list[Reply], Meta(max_length=MOST_BUNDLED)]
+"""What travels back, at once or in parts."""
 
 
 class RunningJob(Message, frozen=True):

@@ -28,7 +28,7 @@ from schema.agent.service import session_config
 from schema.agent.supervisor import stop_on_signals
 from schema.agent.topics import Member, Role, agents_alive, member_of
 from schema.errors import MalformedMessage
-from schema.limits import ADVANCE_REQUEST_BYTES, MOST_EPOCH
+from schema.limits import ADVANCE_REQUEST_BYTES, BUNDLE_BYTES, MOST_EPOCH
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
@@ -38,6 +38,8 @@ from schema.wire.messages import (
     Call,
     Crash,
     Failure,
+    Jobs,
+    Reply,
     Request,
     RunningJob,
     StateMissing,
@@ -61,6 +63,8 @@ _OPEN = 200
 """Most queries that wait for replies at a time."""
 _KEPT = 30
 """Messages of each kind that are kept to be mutated."""
+_BUNDLED = 0.8
+"""Share of jobs and answers that are bundled as they should be."""
 _LIARS = 2
 """Agents of each role that join."""
 _NOBODY = "no-such-run-of-anybody"
@@ -203,7 +207,9 @@ class HostileClient:
         kind = key.rpartition("/")[2]
         with self._lock:
             if query.payload is not None and kind == "jobs" and "liar" not in key:
-                self._heard[kind].append(query.payload.to_bytes())
+                with suppress(MalformedMessage):
+                    jobs = decode(Jobs, query.payload.to_bytes(), BUNDLE_BYTES)
+                    self._heard[kind].extend(jobs)
             self._reply(query, kind, "foreign")
 
     def _lie_as(self, liar: Member) -> Callable[[zenoh.Query], None]:
@@ -237,10 +243,15 @@ class HostileClient:
                 return
             times = 2 if choice == 2 else 1
             for _ in range(times):
-                query.reply(key, self._replier.message(_answers(kind)))
+                data = self._replier.message(_answers(kind))
+                if kind == "jobs" and draw.random() < _BUNDLED:
+                    data = encode([Reply(0, data)])
+                query.reply(key, data)
                 self.sent[f"{who} reply to {kind}"] += 1
 
     def _get(self, key: str, data: bytes, kind: str, sender: bytes = b"") -> None:
+        if key.endswith("/jobs") and self._mutator.random.random() < _BUNDLED:
+            data = encode([data])
         self._free.acquire()
         self.sent[kind] += 1
 

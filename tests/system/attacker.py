@@ -15,10 +15,18 @@ from msgspec.structs import replace
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member, Role
-from schema.limits import ADVANCE_REQUEST_BYTES
+from schema.limits import ADVANCE_REQUEST_BYTES, BUNDLE_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
-from schema.wire.messages import Answer, Call, Crash, Evaluate, Request, RunningJob
+from schema.wire.messages import (
+    Answer,
+    Call,
+    Crash,
+    Evaluate,
+    Jobs,
+    Request,
+    RunningJob,
+)
 from tests.system.fleet import alive, introduce
 from tests.system.workspace import address_of
 
@@ -53,7 +61,9 @@ class Attacker:
         data = encode(Request(self.run, epoch, 1, Call(b"\xc0"), b""))
         for role in ("worker", "analyzer"):
             for member in self.agents(role):
-                self.session.get(member.jobs, payload=data, consolidation=_NOW)
+                self.session.get(
+                    member.jobs, payload=encode([data]), consolidation=_NOW
+                )
 
     def overhear(self, act: Callable[[str, bytes], None]) -> None:
         """Call a function with the key and the request of each job that is sent."""
@@ -61,7 +71,8 @@ class Attacker:
         def hear(query: zenoh.Query) -> None:
             with query:
                 assert query.payload is not None
-                act(str(query.key_expr), query.payload.to_bytes())
+                for job in decode(Jobs, query.payload.to_bytes(), BUNDLE_BYTES):
+                    act(str(query.key_expr), job)
 
         self.serve("revolve/**/jobs", zenoh.handlers.Callback(hear))
 
@@ -89,7 +100,8 @@ class Attacker:
                 return
             sent[request.number] += 1
             endless = replace(request, work=replace(work, steps=_ENDLESS))
-            self.session.get(key, payload=encode(endless), consolidation=_NOW)
+            data = encode([encode(endless)])
+            self.session.get(key, payload=data, consolidation=_NOW)
 
         self.overhear(act)
 

@@ -21,9 +21,9 @@ from schema.agent.request_handler import answer
 from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
 from schema.agent.topics import Member, unique_name
-from schema.limits import ADVANCE_REQUEST_BYTES
-from schema.wire.codec import decode
-from schema.wire.messages import Request
+from schema.limits import BUNDLE_BYTES
+from schema.wire.codec import decode, encode
+from schema.wire.messages import Jobs, Reply, Request
 from tests.system.fleet import introduce
 
 GONE_S = 0.3
@@ -36,10 +36,10 @@ def main(address: str, behaviour: str) -> None:
     prepare_process()
     # They import numpy.
     from worker.arena.world import World  # noqa: PLC0415
-    from worker.serve.jobs import Jobs  # noqa: PLC0415
+    from worker.serve.jobs import Jobs as Work  # noqa: PLC0415
     from worker.serve.shards import Shards  # noqa: PLC0415
 
-    compute = Jobs(Shards(World)).answer
+    compute = Work(Shards(World)).answer
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
     member = Member("default", "worker", unique_name("odd"))
@@ -63,8 +63,10 @@ def main(address: str, behaviour: str) -> None:
                 continue
             with query:
                 assert query.payload is not None
-                asked = query.payload.to_bytes()
-                data = answer(compute, decode(Request, asked, ADVANCE_REQUEST_BYTES))
+                jobs = decode(Jobs, query.payload.to_bytes(), BUNDLE_BYTES)
+                requests = (decode(Request, each, BUNDLE_BYTES) for each in jobs)
+                done = (answer(compute, each) for each in requests)
+                data = encode([Reply(place, each) for place, each in enumerate(done)])
                 count += 1
                 if behaviour == "late":
                     token.undeclare()  # type: ignore[no-untyped-call]

@@ -31,7 +31,7 @@ from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
-from schema.errors import NetworkError
+from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     ANSWER_BYTES,
     INFO_BYTES,
@@ -41,7 +41,8 @@ from schema.limits import (
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode, encode
-from schema.wire.messages import AgentInfo, Answer, Evaluate, Request
+from schema.wire.messages import AgentInfo, Answer, Evaluate, Reply, Request
+from tests.system.fleet import introduce
 
 pytestmark = pytest.mark.system
 
@@ -107,6 +108,13 @@ def has(count: int) -> Callable[[list[DispatchEvent]], bool]:
     return lambda events: len(events) >= count
 
 
+def send(network: Network, name: str, *numbers: int, wait_s: float = WAIT_S) -> None:
+    """Send jobs to an agent, together and at once."""
+    for number in numbers:
+        network.send(number, name, request(number), wait_s)
+    assert network.receive(0.0) == []
+
+
 def line_of(process: subprocess.Popen[str]) -> str:
     assert process.stdout is not None
     return process.stdout.readline()
@@ -168,6 +176,7 @@ def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:
     numbers = ask(fleet, 3)
     with agent(network, "a", "stuck") as process:
         listen(fleet, lambda: fleet.dispatch.waiting("worker") == 1)
+        assert not fleet.listen(0.0, time.monotonic())  # sends what is assigned
         assert line_of(process) == "begun\n"
         process.send_signal(signal.SIGKILL)
         with agent(network, "b"):
@@ -190,7 +199,7 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
 
             assert quiet_s("busy") == quiet_s("stuck") == -1.0
             for process, name in ((busy, "busy"), (it, "stuck")):
-                network.send(0, name, request(0), WAIT_S)
+                send(network, name, 0)
                 assert line_of(process) == "begun\n"
             end_s = time.monotonic() + PATIENCE_S
             while quiet_s("stuck") <= LONGEST_QUIET_S:
@@ -209,8 +218,7 @@ def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(
 ) -> None:
     with agent(network, "w", "slow") as process:
         until(network, has(1))
-        network.send(0, "w", request(0), WAIT_S)
-        network.send(1, "w", request(1), WAIT_S)
+        send(network, "w", 0, 1)
         assert line_of(process) == "begun\n"
         process.terminate()
         go_on(process)
@@ -250,13 +258,12 @@ def test_a_long_job_that_is_asked_for_again_is_done_once(
     with agent(network, "w", "long") as process:
         until(network, has(1))
         capfd.readouterr()  # an agent that starts slowly answers an old question
-        network.send(0, "w", request(0), 0.5)
+        send(network, "w", 0, wait_s=0.5)
         assert line_of(process) == "begun\n"
         (event,) = until(network, has(1))
         assert isinstance(event, Returned)
         assert event.outcome == "expired"
-        network.send(0, "w", request(0), WAIT_S)
-        network.send(1, "w", request(1), WAIT_S)
+        send(network, "w", 0, 1)
         go_on(process, 2)
         events = until(network, has(2))
         process.terminate()
@@ -287,10 +294,10 @@ def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> No
 def test_cancelled_job_is_not_done(network: Network) -> None:
     with agent(network, "w", "slow") as process:
         until(network, has(1))
-        network.send(0, "w", request(0), WAIT_S)
+        send(network, "w", 0)
         # What is sent in this order arrives in it.
         network.cancel("w", request(1))
-        network.send(1, "w", request(1), WAIT_S)
+        send(network, "w", 1)
         network.cancel("nobody", request(1))
         assert line_of(process) == "begun\n"
         go_on(process)
@@ -434,3 +441,35 @@ def test_a_hub_without_a_coordinator_of_the_fleet_is_told(network: Network) -> N
     expected = ": no coordinator of fleet other replies$"
     with pytest.raises(NetworkError, match=expected):
         ask_coordinators(b"", connect=network.address, fleet="other")
+
+
+def test_replies_of_a_liar_end_each_of_its_jobs_once(network: Network) -> None:
+    peer = Member("default", "worker", "x")
+    replies = (
+        encode([Reply(1, b"first")]),
+        encode([Reply(1, b"second"), Reply(7, b"nobody's"), Reply(2, reason="no")]),
+        b"malformed",
+        encode([Reply(0, b"beyond the number of jobs")]),
+    )
+
+    def lie(query: zenoh.Query) -> None:
+        with query:
+            for each in replies:
+                query.reply(peer.jobs, each)
+
+    with zenoh.open(session_config(client_config(network.address), peer)) as session:
+        jobs = session.declare_queryable(peer.jobs, lie, complete=True)
+        info = introduce(session, peer)
+        token = session.liveliness().declare_token(peer.alive)
+        until(network, has(1))
+        for number in (5, 6, 7):
+            network.send(number, "x", request(number), WAIT_S)
+        returned = until(network, has(3))
+        until(network, lambda _: network.faults.total("late") == 3)
+        for each in (jobs, info, token):
+            each.undeclare()
+    ends = {each.number: each for each in returned if isinstance(each, Returned)}
+    assert [ends[n].outcome for n in (5, 6, 7)] == ["ok", "ok", "error"]
+    assert (ends[6].answer, ends[7].reason) == (b"first", "no")
+    with pytest.raises(MalformedMessage):
+        read_answer(ends[5].answer)

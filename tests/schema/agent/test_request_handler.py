@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
-from schema.agent.request_handler import LONG_S, Compute, Reply, Server
+from schema.agent.request_handler import LONG_S, Compute, Server
 from schema.agent.supervision import CurrentJob, JobWatch, ProcessSlot
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.limits import (
@@ -32,6 +32,7 @@ from schema.wire.messages import (
     Crash,
     Evaluate,
     Failure,
+    Reply,
     Request,
     Result,
     RunningJob,
@@ -184,7 +185,7 @@ def test_cancelled_job_is_skipped_once_and_done_if_it_comes_again() -> None:
         made.cancel(other)
     for number in (6, 8):
         assert result(made.reply(request(number))) == ANSWER
-    assert made.reply(request(7)) == Reply(reason=CANCELLED)
+    assert made.reply(request(7)) == Reply(0, reason=CANCELLED)
     for _ in range(3):
         assert result(made.reply(request(7))) == ANSWER
         made.cancel(fingerprint(request(7)))
@@ -208,7 +209,7 @@ def raising(error: Exception) -> Compute:
 )
 def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None:
     made = server(raising(error))
-    assert made.reply(request()) == Reply(reason=reason)
+    assert made.reply(request()) == Reply(0, reason=reason)
     assert made.counts.refused == 1
     # It may quote the request, which may be long or meant for a terminal.
     quoted = type(error)("\x1b[2J\n" + "x" * 10_000_000)
