@@ -13,7 +13,7 @@ from revolve.children import run_command
 from revolve.runs import Folder, Run, check_table
 from schema.agent.log import warn_user
 from schema.errors import RevolveError, shown
-from schema.tables.description import DETAILS
+from schema.tables.description import DETAILS, groups_of
 from schema.tables.files import read_table
 
 
@@ -116,7 +116,8 @@ def read(folder: Folder) -> Run | Runs:
         raise RevolveError(f"folder: must be the path of a run, got {shown(folder)}")
     path, has_several = Path(folder), False
     with suppress(OSError):  # ``Run`` says which
-        has_several = path.is_dir() and not (path / DETAILS).exists()
+        is_run = (path / DETAILS).exists() or bool(groups_of(path))
+        has_several = path.is_dir() and not is_run
     return Runs(path) if has_several else Run(path)
 
 

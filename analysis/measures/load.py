@@ -18,9 +18,16 @@ from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment, island_experiments
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.experiment.fitness_keys import fitness_text
+from schema.experiment.identity import WHOLE
 from schema.plugins.source import modules_named
 from schema.tables.columns import TABLES, VERSION
-from schema.tables.description import DETAILS, STATE, read_description, read_state
+from schema.tables.description import (
+    DETAILS,
+    STATE,
+    groups_of,
+    read_description,
+    read_state,
+)
 from schema.tables.files import finished_path, has_rows, is_sealed, read_table
 from schema.tables.learnt import with_learnt
 from schema.tables.segments import FINISHED, warn_once
@@ -107,6 +114,8 @@ class LoadedRun:
 def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
     """Return the runs in or below some folders, by path, and what was left out.
 
+    All groups of islands of an archipelago are one run, that of the folder above them.
+
     Of several folders with the same run (experiment, repeat, seed, settings, sources
     of plug-ins) one is kept: that with the most readable tables, then the finished
     one, then the longest, then the first. The number of planned births may differ:
@@ -127,7 +136,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
         raise RunFolderError(f"{names}: no run in or below this folder")
     runs: list[LoadedRun] = []
     left_out: list[LeftOut] = []
-    for folder in sorted(folders):
+    for folder in sorted({*map(_whole, folders)}):
         try:
             runs.append(read_run(folder))
         except RunFolderError as error:
@@ -137,6 +146,14 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
         first = left_out[0]
         raise RunFolderError(f"no run can be read: {first.folder}: {first.why}")
     return _different(runs, left_out), left_out
+
+
+def _whole(folder: Path) -> Path:
+    """Return the folder that holds a group and all others, or else a run's own."""
+    try:
+        return folder if read_description(folder).group == WHOLE else folder.parent
+    except RunFolderError:
+        return folder  # ``read_run`` says why
 
 
 def _different(runs: list[LoadedRun], left_out: list[LeftOut]) -> list[LoadedRun]:
@@ -238,7 +255,7 @@ def _plugins(details: dict[str, Any]) -> dict[str, str]:
 
 def _state(folder: Path, details: dict[str, Any]) -> str:
     """Return a run's state; that of a run without the file is in its table."""
-    if not (folder / STATE).exists():
+    if not ((folder / STATE).exists() or groups_of(folder)):
         return str(details.get("state", "running"))
     try:
         state = read_state(folder)

@@ -32,8 +32,9 @@ from schema.agent.machine import cpu_flags, platform_tag
 from schema.agent.version import VERSION
 from schema.errors import NetworkError, RunFolderError
 from schema.experiment.file import experiment_from_text
+from schema.experiment.identity import WHOLE
 from schema.tables.columns import TABLES
-from schema.tables.description import DETAILS, STATE
+from schema.tables.description import DETAILS, STATE, read_description
 from schema.tables.files import has_rows
 from schema.wire.status import IslandStatus, RunStatus
 
@@ -344,6 +345,9 @@ def check_journal(folder: Path) -> None:
     """
     is_old = (folder / STATE).exists() or any(has_rows(folder, name) for name in TABLES)
     if is_old and not is_begun(folder):
+        known = read_description(folder)
+        if known.archipelago and known.group == WHOLE:
+            raise RunFolderError(f"{folder}: was joined of groups: resume these")
         raise RunFolderError(
             f"{folder / JOURNAL}: is lost: put a sound copy of it in its place, or "
             "begin anew in another folder"

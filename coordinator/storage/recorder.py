@@ -6,7 +6,7 @@ those that are already on disk are skipped by their number.
 
 import contextlib
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -264,12 +264,8 @@ class TableFile:
             self._segment.close()
 
     def _write_parquet(self, path: Path) -> None:
-        """Write all rows, one row group in memory at a time."""
-        with pa.parquet.ParquetWriter(
-            path, self._schema, compression="zstd", write_page_checksum=True
-        ) as file:
-            for rows in in_groups(batches_by_island(self._folder, self._name)):
-                file.write_table(rows)
+        parts = in_groups(batches_by_island(self._folder, self._name))
+        write_parquet(path, self._name, parts)
 
     def _write(self, batch: pa.RecordBatch) -> None:
         """Append a batch to the segment, all or nothing."""
@@ -297,6 +293,15 @@ class TableFile:
                 columns[each.name] = pa.repeat(value, rows)
         arrays = [columns[name] for name in self._schema.names]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+
+
+def write_parquet(path: Path, table: str, parts: Iterable[pa.Table]) -> None:
+    """Write all rows of a table as Parquet, one part in memory at a time."""
+    with pa.parquet.ParquetWriter(
+        path, TABLES[table], compression="zstd", write_page_checksum=True
+    ) as file:
+        for part in parts:
+            file.write_table(part)
 
 
 def _poses_of(event: Advanced) -> pa.Table:

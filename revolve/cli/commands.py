@@ -16,6 +16,7 @@ COMMANDS = {
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
     "compare": (_COORDINATOR, "compare two runs or campaigns that should be equal"),
+    "join": ("coordinator.cli.join", "make one run of groups of islands"),
     "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
     "check": (_COORDINATOR, "check plug-ins as a run does"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),

@@ -6,11 +6,13 @@ description has a digest of its content, so that a changed byte never gives anot
 
 import os
 import stat
+from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+from msgspec import structs
 
 from schema.errors import RunFolderError, expectation, unreadable
 from schema.experiment.identity import WHOLE, Group, Origin
@@ -95,7 +97,7 @@ def description_text(description: Description) -> str:
 
 
 def read_description(folder: Path) -> Description:
-    """Return the description of a folder's run.
+    """Return the description of a folder's run, or of the one of its groups.
 
     Raises:
         RunFolderError: there is no run, or its description is damaged.
@@ -105,6 +107,9 @@ def read_description(folder: Path) -> Description:
         data = read_small(file, MOST_DESCRIPTION)
     except FileNotFoundError:
         check_folder(folder)
+        if groups := groups_of(folder):
+            first = read_description(groups[0])
+            return structs.replace(first, group=WHOLE, digests={})
         why = f"no run is there ({DETAILS} is missing)"
         if runs := sorted(each.parent for each in folder.glob(f"*/{DETAILS}")):
             why = f"holds several runs; give one of them, such as {runs[0]}"
@@ -120,6 +125,54 @@ def read_description(folder: Path) -> Description:
             f"{file}: damaged: {printable(why, 200)}; restore a copy of the file"
         )
     return found
+
+
+def groups_of(folder: Path) -> list[Path]:
+    """Return the folders of the groups of islands that a folder holds, in order.
+
+    There are none in a folder with a run of its own, or without groups.
+
+    Raises:
+        RunFolderError: as of ``check_groups``.
+    """
+    found = [each.parent for each in sorted(folder.glob(f"*/{DETAILS}"))]
+    if (folder / DETAILS).exists() or not found:
+        return []
+    known = {each: read_description(each) for each in found}
+    if all(each.group == WHOLE for each in known.values()):
+        return []
+    return check_groups(known)
+
+
+def check_groups(known: Mapping[Path, RunDetails]) -> list[Path]:
+    """Return the folders of all groups of an archipelago, in order.
+
+    Raises:
+        RunFolderError: a group is missing or doubled, or of another archipelago.
+    """
+    first = next(iter(known))
+    numbered: dict[int, Path] = {}
+    for folder, own in known.items():
+        if own.group == WHOLE:
+            raise RunFolderError(f"{folder}: is no group of islands")
+        if _common(own) != _common(known[first]):
+            raise RunFolderError(
+                f"{folder}: must be a group of the archipelago of {first}"
+            )
+        if other := numbered.get(own.group.number):
+            raise RunFolderError(f"{folder}: is group {own.group}, as {other}")
+        numbered[own.group.number] = folder
+    of = known[first].group.of
+    for number in range(of):
+        if number not in numbered:
+            group = Group(number=number, of=of)
+            raise RunFolderError(f"{first.parent}: group {group} is missing")
+    return [numbered[number] for number in range(of)]
+
+
+def _common(own: RunDetails) -> tuple[object, ...]:
+    """Return what all groups of an archipelago have in common."""
+    return own.name, own.run, own.seed, own.group.of, own.archipelago
 
 
 def check_folder(folder: Path) -> None:
@@ -156,7 +209,8 @@ def run_columns(folder: Path) -> dict[str, int | str | None]:
         known = read_description(folder)
     except RunFolderError:
         return {"seed": None, "run_id": None}
-    origin = (known.name, known.run, known.seed, known.document, known.nonce)
+    nonce = known.archipelago or known.nonce
+    origin = (known.name, known.run, known.seed, known.document, nonce)
     digest = sha256(msgspec.json.encode(origin)).hexdigest()
     return {"seed": known.seed, "run_id": digest[:_RUN_ID_DIGITS]}
 
@@ -197,9 +251,16 @@ def _digest(entries: dict[str, Any]) -> str:
 def read_state(folder: Path) -> State:
     """Return a run's state; after a kill it is still "running".
 
+    Groups are finished if all are, and stopped if none is running.
+
     Raises:
         RunFolderError: the file is damaged.
     """
+    if groups := groups_of(folder):
+        first, *others = set(map(read_state, groups))
+        if others:
+            return "running" if "running" in (first, *others) else "stopped"
+        return first
     file = folder / STATE
     try:
         text = read_small(file, MOST_MARK)

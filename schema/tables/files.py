@@ -22,7 +22,7 @@ from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.checksums import digest_of, read_digests
 from schema.tables.columns import TABLES, completed
-from schema.tables.description import read_description, run_columns
+from schema.tables.description import groups_of, read_description, run_columns
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -188,7 +188,9 @@ def _chain(folder: Path, table: str) -> Iterator[tuple[Path, Batch, int | None]]
 
 
 def has_rows(folder: Path, table: str) -> bool:
-    """Return whether a run has any file of a table."""
+    """Return whether a run, or one of its groups, has any file of a table."""
+    if groups := groups_of(folder):
+        return any(has_rows(each, table) for each in groups)
     return bool(parquet_files(folder, table) or segments_of(folder, table))
 
 
@@ -196,8 +198,11 @@ def is_sealed(folder: Path) -> bool:
     """Return whether a run has once had finished tables.
 
     They get their digests together before the run's state becomes "finished". Runs of
-    0.1 have no digests, but files. Errors are those of ``read_description``.
+    0.1 have no digests, but files. Groups are sealed if all are. Errors are those of
+    ``read_description``.
     """
+    if groups := groups_of(folder):
+        return all(map(is_sealed, groups))
     description = read_description(folder)
     if description.checksums:
         return bool(description.digests)
@@ -260,6 +265,8 @@ def read_table(
     """
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such folder")
+    if groups := groups_of(folder):
+        return joined(groups, table, columns, where)
     schema = TABLES[table]
     if columns is not None:
         schema = pa.schema(map(schema.field, columns), schema.metadata)
@@ -273,19 +280,55 @@ def read_table(
     return _kept(_finished(folder, path, schema), schema, where)
 
 
+def joined(
+    groups: Sequence[Path],
+    table: str,
+    columns: Sequence[str] | None = None,
+    where: pc.Expression | None = None,
+) -> pa.Table:
+    """Return rows of all groups of an archipelago, as ``read_table`` does of a run.
+
+    The one row of ``runs`` is that of the first group, from the first start to the
+    last end.
+    """
+    wanted = TABLES[table].names if columns is None else columns
+    ordered = {"island", "start", "end"} & {*TABLES[table].names}
+    read = [*wanted, *(ordered - {*wanted})]
+    rows = pa.concat_tables(read_table(each, table, read, where) for each in groups)
+    if table == "runs":
+        times = {"start": pc.min(rows["start"]), "end": pc.max(rows["end"])}
+        rows = rows.slice(0, 1)
+        for name, value in times.items():
+            rows = with_column(rows, name, pa.repeat(value, 1))
+    else:
+        # The sort is stable: rows of an island keep their order.
+        rows = rows.take(pc.sort_indices(rows["island"]))
+    if "record" in wanted:
+        rows = with_column(rows, "record", pa.array(range(len(rows)), pa.int64()))
+    return rows.select(list(wanted))
+
+
+def with_column(rows: pa.Table, name: str, values: pa.Array) -> pa.Table:
+    """Return rows with other values in one of their columns."""
+    at = rows.schema.get_field_index(name)
+    return rows.set_column(at, rows.schema.field(at), values)
+
+
 def rows_of_island(folder: Path, table: str, island: int) -> Iterator[pa.Table]:
     """Yield all rows of an island in their repeatable order, no group empty.
 
     Rows of a run that is not finished end at the first gap. About ``GROUP_BYTES`` are
     in memory at a time. Errors are those of ``read_table``.
     """
+    if groups := groups_of(folder):
+        folder = groups[island % len(groups)]
     path = finished_path(folder, table)
-    groups = (
+    parts = (
         in_groups(batches_by_island(folder, table))
         if path is None
         else _finished(folder, path, TABLES[table])
     )
-    own = (group.filter(pc.field("island") == island) for group in groups)
+    own = (part.filter(pc.field("island") == island) for part in parts)
     yield from filter(len, own)
 
 
