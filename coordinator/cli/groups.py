@@ -21,7 +21,7 @@ from coordinator.cli.status_text import births_done, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.run.group_link import births_digest
 from coordinator.storage.campaign import Campaign
-from coordinator.storage.folder import holds_run, read_details
+from coordinator.storage.folder import read_details
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.hints import command, stopped
 from schema.agent.log import tell_error, warn_user
@@ -37,7 +37,7 @@ from schema.errors import (
 )
 from schema.experiment.document import Experiment, island_count
 from schema.experiment.identity import Group
-from schema.tables.description import DETAILS, RunDetails, make_folder
+from schema.tables.description import RunDetails, groups_of, make_folder
 from schema.wire.codec import encode
 from schema.wire.operator import GetStatus, OperatorRequest, decode_operator_reply
 from schema.wire.status import RunStatus, Status, joined
@@ -84,27 +84,14 @@ def groups_below(folder: Path, births: int | None = None) -> list[Path]:
     ``births``: number that all are to get; if a kill came in between, some have it.
 
     Raises:
-        RunFolderError: a group is missing, there is another run, or they differ.
+        RunFolderError: as of ``groups_of``, or they differ in their number of births.
     """
-    folders = sorted(each.parent for each in folder.glob(f"group-*/{DETAILS}"))
-    if holds_run(folder) or not folders:
-        return []
-    known = {each: read_details(each) for each in folders}
-    first = known[folders[0]]
-    for path, details in known.items():
-        own = structs.replace(details.group, number=first.group.number)
-        document = details.document if births is None else first.document
-        if structs.replace(details, group=own, document=document) != first:
-            raise RunFolderError(
-                f"{path}: must be a group of the archipelago of {folders[0]}, with its "
-                "number of births"
-            )
-    found = {details.group.number: path for path, details in known.items()}
-    for number in range(first.group.of):
-        if number not in found:
-            lost = structs.replace(first.group, number=number)
-            raise RunFolderError(f"{folder}: group {lost} is missing")
-    return [found[number] for number in sorted(found)]
+    groups = groups_of(folder)
+    if births is None and len({read_details(each).document for each in groups}) > 1:
+        raise RunFolderError(
+            f"{folder}: its groups differ in their number of births: give --births"
+        )
+    return groups
 
 
 def start_groups(

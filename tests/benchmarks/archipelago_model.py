@@ -97,7 +97,9 @@ class ArchipelagoModel:
         while max(each.births for each in self._islands) < _BROODS * own.brood:
             while self._free and self._waiting:
                 self._evaluate(self._waiting.popleft())
-            self._now_s, _, call, number = heappop(self._agenda)
+            when_s, _, call, number = heappop(self._agenda)
+            self._busy_s += (own.workers - self._free) * (when_s - self._now_s)
+            self._now_s = when_s
             call(number)
         span_s = self._now_s
         return Shares(
@@ -122,7 +124,6 @@ class ArchipelagoModel:
         spread = self._setting.spread
         shift = log(self._setting.evaluation_s) - spread**2 / 2
         lasts_s = float(self._rng.lognormal(shift, spread))
-        self._busy_s += lasts_s
         self._at(self._now_s + lasts_s, self._answer, number)
 
     def _answer(self, number: int) -> None:

@@ -211,7 +211,7 @@ def test_samples_have_no_gaps(samples: Path) -> None:
     names = {path.name for path in samples.iterdir()}
     assert names == {
         "revolve-hub.service", "revolve-worker.service", "workers.slurm",
-        "compose.yaml", "Dockerfile", "worker.def",
+        "coordinators.slurm", "compose.yaml", "Dockerfile", "worker.def",
     }  # fmt: skip
     for path in samples.iterdir():
         assert "@" not in path.read_text().replace("B:USR1@60", "").replace('"$@"', "")
@@ -247,6 +247,33 @@ if [ "$(basename "$0")" = srun ]; then shift; exec sleep 60; fi
 def test_slurm_task_stops_its_workers_and_requeues(
     samples: Path, tmp_path: Path, signal: str, code: int, calls: str
 ) -> None:
+    ended, made = slurm_task(samples / "workers.slurm", tmp_path, signal)
+    assert ended == code
+    assert made[0] == "srun revolve worker --processes 4 --give-up-after 600"
+    assert "".join(made[1:]) == calls
+
+
+@pytest.mark.parametrize("is_begun", [False, True])
+def test_slurm_task_begins_a_group_of_islands_or_resumes_it(
+    samples: Path, tmp_path: Path, *, is_begun: bool
+) -> None:
+    out = tmp_path / "runs" / "group-3"
+    if is_begun:
+        out.mkdir(parents=True)
+        (out / "run.json").touch()
+    sample, words = samples / "coordinators.slurm", ("my ring.toml", "--seed", "1")
+    ended, made = slurm_task(sample, tmp_path, "USR1", *words)
+    begin = f"coordinator my ring.toml --seed 1 --group 3/8 --out {out}"
+    what = f"resume {out}" if is_begun else begin
+    connect = "--connect tls/hub.example:7447 --give-up-after 600"
+    assert ended == 0
+    assert made == [f"srun revolve {what} {connect}", "scontrol requeue 7_3"]
+
+
+def slurm_task(
+    sample: Path, tmp_path: Path, signal: str, *words: str
+) -> tuple[int, list[str]]:
+    """Send a signal to a task once it runs; return its code and the calls it made."""
     tools, log = tmp_path / "tools", tmp_path / "log"
     tools.mkdir()
     for name in ("srun", "scontrol"):
@@ -257,8 +284,9 @@ def test_slurm_task_stops_its_workers_and_requeues(
     (home / "env").write_text("export REVOLVE_CONNECT=tls/hub.example:7447\n")
     log.touch()
     with subprocess.Popen(
-        ["bash", str(samples / "workers.slurm")],
+        ["bash", str(sample), *words],
         env={
+            "OUT": str(tmp_path / "runs"), "SLURM_ARRAY_TASK_COUNT": "8",
             "PATH": f"{tools}:{os.environ['PATH']}", "HOME": str(tmp_path / "home"),
             "LOG": str(log), "SLURM_CPUS_PER_TASK": "4",
             "SLURM_ARRAY_JOB_ID": "7", "SLURM_ARRAY_TASK_ID": "3",
@@ -267,7 +295,5 @@ def test_slurm_task_stops_its_workers_and_requeues(
         while "srun" not in log.read_text():
             assert task.poll() is None
         subprocess.run(["bash", "-c", f"kill -{signal} {task.pid}"], check=True)
-        assert task.wait(30) == code
-    first, *others = log.read_text().splitlines()
-    assert first == "srun revolve worker --processes 4 --give-up-after 600"
-    assert "".join(others) == calls
+        code = task.wait(30)
+    return code, log.read_text().splitlines()

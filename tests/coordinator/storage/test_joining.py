@@ -13,7 +13,7 @@ from coordinator.storage.folder import RunFolder
 from coordinator.storage.joining import join_groups
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
-from schema.experiment.document import Experiment
+from schema.experiment.document import Experiment, Islands
 from schema.experiment.file import experiment_text
 from schema.experiment.identity import Group
 from schema.tables.columns import TABLES
@@ -22,7 +22,9 @@ from schema.tables.files import has_rows, read_table, rows_of_island
 from tests.coordinator.records import make_records
 
 ISLANDS = 5
-DOCUMENT = experiment_text(Experiment("ring", births=8, islands=({},) * ISLANDS))
+DOCUMENT = experiment_text(
+    Experiment("ring", births=8, islands=(Islands(count=ISLANDS),))
+)
 WHOLE = RunDetails("ring", 0, 7, DOCUMENT)
 BEGAN = datetime(2026, 1, 1, tzinfo=UTC)
 
