@@ -277,9 +277,11 @@ def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "islands.md"
     (document,) = blocks_of(page, "toml")
     _write(workspace, {"mine.toml": document})
-    (block,) = blocks_of(page, "sh")
+    block, groups, reading = blocks_of(page, "sh")
     own = "revolve run mine.toml --births 24 --out mine"
     _follow(workspace, [own, *block.splitlines()])
+    *_, last = _follow(workspace, [*groups.splitlines(), *reading.splitlines()])
+    assert last == "equal in all repeatable columns\n"
 
 
 def test_campaign_of_the_campaigns_page_runs(workspace: Workspace) -> None:
