@@ -1,9 +1,11 @@
 """``revolve suite``: score experiments by a frozen protocol, and compare scores."""
 
+import shlex
 from pathlib import Path
 
 from analysis.extras import extra
 from schema.agent.flags import Flags, add_count
+from schema.agent.stopping import advise
 from schema.agent.supervisor import cores, most_processes
 
 SCORE = "score.json"
@@ -26,6 +28,8 @@ def main(arguments: list[str]) -> int:
     from revolve.suite.runs import evolve, score_runs
 
     references = {name: score.read_score(name, protocol) for name in score.REFERENCES}
+    own = shlex.join(["revolve", *arguments])
+    advise(f"stopped; to continue and to write the score: {own}", is_final=True)
     wanted = (protocol, options.experiment, options.out, options.workers or cores())
     if code := evolve(*wanted):
         return code

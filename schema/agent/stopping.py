@@ -27,6 +27,7 @@ STOPPED = 130
 """Exit code of a command that a signal stopped."""
 
 _ADVICE: list[str] = []
+_FINAL: list[str] = []
 _TOLD: list[str] = []
 _RECEIVED: list[int] = []
 
@@ -74,10 +75,15 @@ def finish_stop() -> None:
         tell_stopped()
 
 
-def advise(line: str) -> None:
-    """Set the line that tells the user how to go on after a stop."""
-    _ADVICE[:] = [line]
-    _TOLD.clear()
+def advise(line: str, *, is_final: bool = False) -> None:
+    """Set the line that tells the user how to go on after a stop.
+
+    ``is_final``: that of a command which calls others keeps its own.
+    """
+    if not _FINAL:
+        _ADVICE[:] = [line]
+        _TOLD.clear()
+    _FINAL.extend([line] * is_final)
 
 
 def tell_stopped() -> None:

@@ -1,6 +1,7 @@
 """``revolve suite``: its frozen protocol, shipped scores, comparison, refusals."""
 
 import json
+import shlex
 import statistics
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from revolve.suite.score import (
     read_score,
     score_text,
 )
+from schema.agent.stopping import STOPPED, advise, tell_stopped
 
 FROZEN = "601d55b8f1be7cc8da27ba1add0c7f4902545d6e777e1bac869a1a0f3d73e09a"
 SHIPPED = Path(rv.__file__).parent / "suite"
@@ -141,3 +143,27 @@ def test_experiment_that_contradicts_a_task_is_refused() -> None:
     what = "^scenario1 on locomotion: .*births"
     with pytest.raises(rv.ExperimentError, match=what):
         obeying(protocol, rv.Experiment.read("scenario1"), "scenario1")
+
+
+def test_a_suite_that_is_stopped_names_its_own_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object) -> int:
+        advise("to resume the runs: revolve resume")
+        tell_stopped()
+        return STOPPED
+
+    monkeypatch.setattr("revolve.suite.runs.evolve", stopped)
+    for name in ("_ADVICE", "_FINAL", "_TOLD"):
+        monkeypatch.setattr(f"schema.agent.stopping.{name}", [])
+    words = [
+        "suite",
+        "run",
+        "--experiment",
+        "scenario1",
+        "--out",
+        str(tmp_path / "a b"),
+    ]
+    assert main(words) == STOPPED
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith(f"the score: {shlex.join(['revolve', *words])}")
