@@ -32,6 +32,7 @@ from analysis.progress import bars, replaced
 from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
+from schema.agent.supervisor import cores
 from schema.errors import RevolveError, counted, shown
 from schema.tables.description import check_folder, make_folder
 
@@ -121,7 +122,8 @@ def _measured(
     bar: Progress,
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     slots: SlotRule = "own" if options.slots == "own" else "parent"
-    measuring = measure_runs(runs, slots=slots, processes=options.processes)
+    processes = options.processes or cores()
+    measuring = measure_runs(runs, slots=slots, processes=processes)
     measured = list(bar.track(measuring, len(runs), description="measuring runs"))
     comparing = bar.add_task("comparing experiments", total=None)
     empty = {name: schema(name).empty_table() for name in _ALWAYS}

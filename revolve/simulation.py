@@ -6,7 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
@@ -57,11 +56,11 @@ class Simulation(AbstractContextManager["Simulation"]):
         """Build the model and start."""
         choose_engine()
         from worker.filters.channels import inputs_of, motors_of  # noqa: PLC0415
-        from worker.kinds import checked_evaluation  # noqa: PLC0415
+        from worker.kinds import checked as with_plugins  # noqa: PLC0415
 
         settings = settings_for(robot, experiment, record)
         self._robot = checked(robot, types_of(settings))
-        self._settings = checked_evaluation(msgspec.json.encode(settings))
+        self._settings = with_plugins(settings)
         space = body_space(settings.space)
         self.inputs = tuple(name for *_, name in inputs_of(self._robot, space))
         self.motors = tuple(name for *_, name in motors_of(self._robot, space))

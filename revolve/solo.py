@@ -8,7 +8,7 @@ import msgspec
 from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
 from schema.experiment.document import body_space
-from schema.experiment.settings import EvaluationSettings
+from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
 
@@ -31,11 +31,11 @@ def _done(task: Task) -> Outcome:
         from analysis.render.stage import choose_engine  # noqa: PLC0415
 
         choose_engine()
-    from worker.kinds import checked_evaluation  # noqa: PLC0415
+    from worker.kinds import checked  # noqa: PLC0415
     from worker.robot.evaluation import evaluate_traced  # noqa: PLC0415
 
     # Before the robot, whose neurons may be those of a plug-in.
-    settings = checked_evaluation(task.settings)
+    settings = checked(read_evaluation_settings(task.settings))
     robot = task.robot
     check_types(robot, body_space(settings.space))
     if task.size is not None:

@@ -4,6 +4,8 @@ The class of an exception names the source of the fault, which decides its handl
 """
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from typing import Any, Literal
 
@@ -19,6 +21,15 @@ class RevolveError(Exception):
     def __str__(self) -> str:
         """Return the message, which is never empty."""
         return super().__str__().strip() or NO_MESSAGE
+
+
+@contextmanager
+def naming(where: object, kind: type[RevolveError] = RevolveError) -> Iterator[None]:
+    """Begin the message of an error of a kind with the place where it occurs."""
+    try:
+        yield
+    except kind as error:
+        raise type(error)(f"{where}: {error}") from error
 
 
 class ExperimentError(RevolveError):

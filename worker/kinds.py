@@ -12,8 +12,6 @@ from schema.experiment.settings import (
     ArenaSettings,
     EvaluationSettings,
     fitness_function,
-    read_arena_settings,
-    read_evaluation_settings,
 )
 from schema.plugins.simple_traces import check_function
 from worker.fitness import load_fitness
@@ -73,23 +71,12 @@ T = TypeVar("T", EvaluationSettings, ArenaSettings)
 
 
 @lru_cache(maxsize=64)
-def checked_evaluation(settings: bytes) -> EvaluationSettings:
-    """Return the settings of an evaluation request, with checked plug-ins.
+def checked(settings: T) -> T:
+    """Return the settings of a request, with checked plug-ins.
 
     Raises:
-        ExperimentError: the bytes are not such settings; a plug-in cannot be loaded or
-            breaks its contract.
+        ExperimentError: a plug-in cannot be loaded or breaks its contract.
     """
-    return _checked(read_evaluation_settings(settings))
-
-
-@lru_cache(maxsize=64)
-def checked_arena(settings: bytes) -> ArenaSettings:
-    """Return the settings of a request about an arena, as ``checked_evaluation``."""
-    return _checked(read_arena_settings(settings))
-
-
-def _checked(settings: T) -> T:
     body_space(settings.space)
     Use(FITNESS_KIND, settings.fitness).check()
     for measures in single_measures(settings.measures):

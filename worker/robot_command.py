@@ -17,7 +17,7 @@ from schema.plugins.permission import allow
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
-from worker.robot.robustness import rejudge, small_changes, summary
+from worker.robot.robustness import all_changes, rejudge, summary
 
 
 def main(arguments: list[str]) -> int:
@@ -68,7 +68,8 @@ def _show_robustness(
         print(f"{'undisturbed:':26}{rounded(fitness)}")
     kept: list[float | None] = []
     again = partial(_evaluate, trial=trial)
-    for change, changed in rejudge(robot, small_changes(settings), again):
+    changes = (change for change in all_changes(settings) if change.is_small)
+    for change, changed in rejudge(robot, changes, again):
         print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)
         kept.append(changed)
     print(summary(fitness, kept))

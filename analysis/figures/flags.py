@@ -3,8 +3,7 @@
 import argparse
 from pathlib import Path
 
-from schema.agent.flags import Flags, add_plugins, whole_number
-from schema.agent.supervisor import cores
+from schema.agent.flags import Flags, add_count, add_plugins
 
 WIDTHS_IN = {"column": 3.5, "page": 7.2}
 """Widths of a paper's column and page [inches]."""
@@ -70,14 +69,8 @@ def parser(_command: str = "analyze") -> Flags:
         help="slot that labels a part in the tree edit distance between bodies: its "
         "parent's, as in the thesis (default), or its own, as in the published code",
     )
-    flags.add_argument(
-        "--processes",
-        type=whole_number(),
-        default=cores(),
-        metavar="N",
-        help="number of processes, which measure runs in parallel (default: number of "
-        "cores)",
-    )
+    what = "number of processes, which measure runs in parallel (default: of cores)"
+    add_count(flags, "--processes", None, what)
     add_plugins(flags)
     return flags
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from schema.agent.flags import (
     Flags,
+    add_count,
     add_plugins,
     add_settings,
     positive_number,
@@ -51,10 +52,7 @@ def parser(_command: str = "robot render") -> Flags:
         help="width and height of a picture in pixels (default: 640x480; the height "
         "is three quarters of the width)",
     )  # fmt: skip
-    flags.add_argument(
-        "--fps", type=whole_number(1, MOST_FPS), default=25, metavar="N",
-        help="frames per second of a film (default: %(default)s)",
-    )  # fmt: skip
+    add_count(flags, "--fps", 25, "frames per second of a film", most=MOST_FPS)
     flags.add_argument(
         "--camera", choices=CAMERAS,
         help="moves with the robot (follow), or stands still and sees its whole way "

@@ -3,16 +3,16 @@
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Numbers = npt.NDArray[np.float64]
+from schema.robot.trace import Floats
+
 _FILLED = 0.88
 """Share of a picture's width or height that is filled."""
 _ROUNDS = 5
 """Near points are further from the middle than far ones: it is found step by step."""
 
 
-def view_axes(azimuth: float, elevation: float) -> Numbers:
+def view_axes(azimuth: float, elevation: float) -> Floats:
     """Return the directions right, up and towards a camera, (3, 3), of a view [rad]."""
     flat = math.cos(elevation)
     forward = np.array(
@@ -23,8 +23,8 @@ def view_axes(azimuth: float, elevation: float) -> Numbers:
 
 
 def framed(
-    points: Numbers, azimuth: float, elevation: float, tangents: tuple[float, float]
-) -> tuple[Numbers, float]:
+    points: Floats, azimuth: float, elevation: float, tangents: tuple[float, float]
+) -> tuple[Floats, float]:
     """Return the point that a camera looks at, and its distance [m], to see points.
 
     The points are in the middle of the picture and fill it but for a rim.

@@ -94,7 +94,9 @@ def draw_film(
         NoPictures: the run has no arena, or no poses are recorded.
     """
     _, experiment, news = read_past(folder)
-    islands = read_frames(folder, *span)
+    islands: dict[int, dict[float, Poses]] = {}
+    for island, table in read_poses(folder, *span):
+        islands.setdefault(island, {}).update(frames_of(table))
     if not islands:
         if scene_of(experiment).arenas:
             raise NoPictures(
@@ -125,18 +127,6 @@ def draw_film(
             ]
             pictures.append(gait_strip(beside, texts, columns=_COLUMNS))
     return pictures, times_s
-
-
-def read_frames(folder: Path, start_s: float, end_s: float) -> Mapping[int, Frames]:
-    """Return the poses of a span, by island and time.
-
-    Raises:
-        RunFolderError: the table cannot be read.
-    """
-    islands: dict[int, dict[float, Poses]] = {}
-    for island, table in read_poses(folder, start_s, end_s):
-        islands.setdefault(island, {}).update(frames_of(table))
-    return islands
 
 
 def _renderer(

@@ -26,7 +26,6 @@ from analysis.viewer.entities import (
 from analysis.viewer.ground import Relief, Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
-from schema.experiment.scenery import Solid
 from schema.mjcf.model import quaternion
 
 APPLICATION = "revolve"
@@ -128,7 +127,7 @@ class Recording(AbstractContextManager["Recording"]):
     def ground(self, path: str, surfaces: Sequence[Surface]) -> None:
         """Log ground and scenery above the plane of an entity."""
         for number, surface in enumerate(surfaces):
-            drawn = _relief(surface) if isinstance(surface, Relief) else _solid(surface)
+            drawn = _drawn(surface)
             self._stream.log(f"{path}/ground/{number}", drawn, static=True)
 
     def log_boxes(self, path: str, model: BoxModel, when: TimePoint) -> None:
@@ -258,16 +257,14 @@ class Recording(AbstractContextManager["Recording"]):
             self._stream.set_time(BIRTHS, sequence=when.births)
 
 
-def _relief(ground: Relief) -> rr.Mesh3D:
-    return rr.Mesh3D(
-        vertex_positions=ground.corners.reshape(-1, 3),
-        vertex_normals=np.repeat(ground.normals, 3, axis=0),
-        albedo_factor=_EARTH,
-    )
-
-
-def _solid(solid: Solid) -> rr.AsComponents:
-    """Return a shape of scenery; a capsule's place is that of its lower end."""
+def _drawn(solid: Surface) -> rr.AsComponents:
+    """Return ground or a shape of scenery; a capsule's place is its lower end."""
+    if isinstance(solid, Relief):
+        return rr.Mesh3D(
+            vertex_positions=solid.corners.reshape(-1, 3),
+            vertex_normals=np.repeat(solid.normals, 3, axis=0),
+            albedo_factor=_EARTH,
+        )
     a, b, _ = solid.size.tolist()
     settings: dict[str, Any] = {
         "quaternions": [np.roll(quaternion(solid.rotation), -1)],

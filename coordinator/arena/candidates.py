@@ -122,7 +122,9 @@ class BreedingQueue:
             self._failed = request.end
         else:
             self.take_number()
-        self._end_mating(candidate)
+        assert self._mating is not None
+        outcome = "not viable" if candidate is None else "born"
+        self._children.append((self._mating, candidate, outcome))
         return self._next_child()
 
     def _is_new(self, event: Bred, request: Breed | None) -> bool:
@@ -133,11 +135,6 @@ class BreedingQueue:
         if number == self._next:
             return event.attempt >= self._failed
         return not 0 <= number < self._next
-
-    def _end_mating(self, child: Candidate | None) -> None:
-        assert self._mating is not None
-        outcome = "not viable" if child is None else "born"
-        self._children.append((self._mating, child, outcome))
 
     def _begin(self, number: int, attempt: int, why: str = "") -> Breed:
         """Return the request for a founder, or for the child of the current mating."""

@@ -11,9 +11,14 @@ from msgspec import json
 from msgspec.structs import replace
 
 from coordinator.evolution.encodings import IslandEncoding, encoding_of, outside_limits
-from schema.errors import ExperimentError, InvalidRobot, MalformedMessage, check_most
+from schema.errors import (
+    ExperimentError,
+    InvalidRobot,
+    MalformedMessage,
+    check_most,
+    naming,
+)
 from schema.experiment.brains import types_of
-from schema.experiment.check import naming
 from schema.experiment.document import (
     UNNAMED,
     Experiment,

@@ -10,7 +10,7 @@ from typing import get_args
 from coordinator.cluster.certificates import AUTHORITY_DAYS
 from coordinator.cluster.kit import DAYS, PORT, ClusterKit, Kit, utc_now
 from schema.agent.access import Certificate, CertificateRole, check_certificates
-from schema.agent.flags import Flags, add_count, whole_number
+from schema.agent.flags import Flags, add_count
 
 _OTHERS: tuple[tuple[str, CertificateRole], ...] = (
     ("coordinator", "coordinator"),
@@ -144,14 +144,8 @@ def parser(_command: str = "cluster") -> Flags:
         help="a name for each worker's machine, or one for a whole batch system; "
         "separated by commas",
     )
-    init.add_argument(
-        "--days",
-        type=whole_number(most=AUTHORITY_DAYS),
-        default=DAYS,
-        metavar="N",
-        help=f"days until the certificates expire, at most {AUTHORITY_DAYS} (default: "
-        "%(default)s)",
-    )
+    days = f"days until the certificates expire, at most {AUTHORITY_DAYS}"
+    add_count(init, "--days", DAYS, days, most=AUTHORITY_DAYS)
     add = action("add", "issue a certificate for another machine")
     add.add_argument("name", metavar="NAME", help="name of the machine, in the fleet")
     add.add_argument(

@@ -1,10 +1,10 @@
 """Counts of what peers sent and the coordinator did not use, by kind and peer."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 from schema.limits import LONGEST_REASON, MOST_PEERS, printable
+from schema.wire.status import PeerFault
 
 FaultKind = Literal[
     "malformed", "refused", "late", "foreign", "fenced", "cancelled", "death", "crowd",
@@ -23,15 +23,6 @@ MEANINGS: Mapping[FaultKind, str] = {
     "migrants": "migrants that cannot be those of the archipelago, dropped",
 }
 OTHERS = "other peers"
-
-
-@dataclass(frozen=True, slots=True)
-class FaultCount:
-    """How often a peer, or all that are not named, had a kind of fault."""
-
-    kind: FaultKind
-    peer: str
-    count: int
 
 
 class PeerFaults:
@@ -75,12 +66,10 @@ class PeerFaults:
         return sum(count for (known, _), count in self._counts.items() if known == kind)
 
     @property
-    def counts(self) -> tuple[FaultCount, ...]:
+    def counts(self) -> tuple[PeerFault, ...]:
         """All counts, by kind and peer."""
-        return tuple(
-            FaultCount(kind, peer, count)
-            for (kind, peer), count in sorted(self._counts.items())
-        )
+        found = sorted(self._counts.items())
+        return tuple(PeerFault(kind, peer, count) for (kind, peer), count in found)
 
 
 def _first_line(key: tuple[FaultKind, str], detail: str) -> str:

@@ -8,6 +8,7 @@ import stat
 import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from schema.agent.network import Tls
 from schema.agent.service import why_no_hub
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
+from schema.plugins.permission import GROUP
 
 _REACH_S = 1.0
 _RENDER_S = 4.5
@@ -70,7 +72,10 @@ def _machine() -> Iterator[Finding]:
         yield machine.check_runtime(str(runtime_directory()), "")
     except NetworkError as error:
         yield machine.check_runtime("", str(error))
-    yield machine.check_plugins(system.plugin_modules())
+    # None is imported, not even a parent package.
+    modules = [point.module for point in entry_points(group=GROUP)]
+    found = {name: find_spec(name.partition(".")[0]) is not None for name in modules}
+    yield machine.check_plugins(found)
     yield machine.check_viewer(
         has_package=find_spec("rerun") is not None, no_screen=missing_screen()
     )

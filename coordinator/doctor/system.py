@@ -3,14 +3,11 @@
 import platform
 import subprocess
 import sys
-from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 
 from schema.agent.import_path import environment
 from schema.agent.machine import group_numbers, system_text, wire_version
 from schema.agent.version import LIBRARIES, VERSION, installed
-from schema.plugins.permission import GROUP
 
 # In a process of its own: a broken driver may end it.
 _RENDER = """
@@ -52,18 +49,6 @@ def group_bytes() -> int | None:
     known = group_numbers("memory.max", "memory.current")
     known += group_numbers("memory.limit_in_bytes", "memory.usage_in_bytes")
     return min((max(0, limit - used) for limit, used in known), default=None)
-
-
-def plugin_modules() -> dict[str, bool]:
-    """Return the modules of installed plug-ins, and whether each is there.
-
-    None is imported, not even a parent package.
-    """
-    points = metadata.entry_points(group=GROUP)
-    return {
-        point.module: find_spec(point.module.partition(".")[0]) is not None
-        for point in points
-    }
 
 
 def start_rendering() -> "subprocess.Popen[str]":

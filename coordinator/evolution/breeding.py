@@ -5,8 +5,8 @@ make it (``coordinator.evolution.newborns``). Attempts are numbered through all 
 of a birth, so that each has its own stream.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 from types import MappingProxyType
 from typing import Annotated
@@ -18,9 +18,9 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.founders import Founder
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.random_streams import Purpose, stream
-from coordinator.evolution.rules import Rule, rule_of, select_parents, select_survivors
+from coordinator.evolution.rules import Rule, rule_of, select_survivors
 from coordinator.evolution.selection import cull_population
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, naming
 from schema.experiment.document import Experiment
 from schema.experiment.section import AtLeastOne, Count
 from schema.limits import LONGEST_NAME, MOST_MEASURES, MOST_PARTS, ROBOT_BYTES, Finite
@@ -100,14 +100,10 @@ class Individual(Message, frozen=True):
         return None if self.has_failed else self.fitness
 
 
-@contextmanager
-def at_birth(birth: BirthId) -> Iterator[None]:
+def at_birth(birth: BirthId) -> AbstractContextManager[None]:
     """Say at which birth an error occurs, of a plug-in for example."""
-    try:
-        yield
-    except ExperimentError as error:
-        where = f"birth {birth.number} of island {birth.island}"
-        raise type(error)(f"{where}: {error}") from error
+    where = f"birth {birth.number} of island {birth.island}"
+    return naming(where, ExperimentError)
 
 
 def failed_last(individuals: Iterable[Individual]) -> list[Individual]:
@@ -219,7 +215,8 @@ class Breeder:
                 return Breed(birth, attempt, end), None
             else:
                 rng = self._stream(birth, attempt, Purpose.PARENTS)
-                couple = select_parents(population, rng, self._parents_rule)
+                places = self._parents_rule.places(2, population, rng)
+                couple = tuple(population[at] for at in places)
         return Breed(birth, attempt, end, tuple(one.genome for one in couple)), couple
 
     def candidate(self, bred: Bred, couple: Couple | None) -> Candidate | None:

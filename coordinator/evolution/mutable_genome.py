@@ -7,7 +7,7 @@ function call, and convert it into a new genome.
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import count
-from operator import add
+from operator import add, le, sub
 from typing import NamedTuple, TypeVar
 
 from msgspec import Struct, field
@@ -20,9 +20,6 @@ from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot.ids import BirthId
 
 Gene = TypeVar("Gene", NeuronGene, ConnectionGene)
-
-
-_TUPLES = (tuple, tuple, tuple)
 
 
 class MutableGenome(Struct, eq=False):
@@ -128,10 +125,6 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return the genome of a tree whose branches are given depth first."""
     nodes: list[Node] = []
     for branch in reversed(branches):
-        outputs, hidden, connections = branch.outputs, branch.hidden, branch.connections
-        if (type(outputs), type(hidden), type(connections)) != _TUPLES:
-            outputs, hidden = _as_tuple(outputs), _as_tuple(hidden)
-            connections = _as_tuple(connections)
         # Backwards: children are made before their parent, the last one first.
         children = [(slot, nodes.pop()) for slot in branch.children]
         node = Node(
@@ -140,9 +133,9 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
             branch.orientation,
             branch.parameters,
             branch.gene,
-            outputs,
-            hidden,
-            connections,
+            _as_tuple(branch.outputs),
+            _as_tuple(branch.hidden),
+            _as_tuple(branch.connections),
             tuple(children),
         )
         nodes.append(node)
@@ -233,10 +226,6 @@ def level(branches: Iterable[MutableGenome]) -> None:
         turns[branch] = (before + branch.orientation) % 360
 
 
-Counts = tuple[int, int, int, int]
-"""Plain ``SizeCounts``; a tree has too many subtrees for the names to be free."""
-
-
 class SizeCounts(NamedTuple):
     """Numbers of parts, inputs, outputs and hidden neurons of some branches."""
 
@@ -245,15 +234,13 @@ class SizeCounts(NamedTuple):
     outputs: int
     hidden: int
 
-    def plus(self, other: Counts) -> "SizeCounts":
+    def plus(self, other: "SizeCounts") -> "SizeCounts":
         """Return the sum with other counts."""
         return SizeCounts(*map(add, self, other))
 
-    def minus(self, other: Counts) -> "SizeCounts":
+    def minus(self, other: "SizeCounts") -> "SizeCounts":
         """Return what is left without other counts."""
-        parts, inputs, outputs, hidden = self
-        p, i, o, h = other
-        return SizeCounts(parts - p, inputs - i, outputs - o, hidden - h)
+        return SizeCounts(*map(sub, self, other))
 
 
 def size_limits(space: Space) -> SizeCounts:
@@ -274,29 +261,20 @@ def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
     return SizeCounts(parts, inputs, outputs, hidden)
 
 
-def subtree_sizes(branches: Sequence[MutableGenome]) -> list[Counts]:
+def subtree_sizes(branches: Sequence[MutableGenome]) -> list[SizeCounts]:
     """Return the counts of every subtree of a whole tree, given depth first."""
-    sums: list[Counts] = []
-    of_children: list[Counts] = []
+    sums: list[SizeCounts] = []
+    of_children: list[SizeCounts] = []
     for branch in reversed(branches):
-        parts, inputs = 1, branch.kind.inputs
-        outputs, hidden = len(branch.outputs), len(branch.hidden)
+        counts = size_of([branch])
         for _ in branch.children:
-            p, i, o, h = of_children.pop()
-            parts, inputs = parts + p, inputs + i
-            outputs, hidden = outputs + o, hidden + h
-        counts = parts, inputs, outputs, hidden
+            counts = counts.plus(of_children.pop())
         of_children.append(counts)
         sums.append(counts)
-    sums.reverse()
-    return sums
+    return sums[::-1]
 
 
-def fitting_subtrees(sizes: Sequence[Counts], room: SizeCounts) -> list[int]:
+def fitting_subtrees(sizes: Sequence[SizeCounts], room: SizeCounts) -> list[int]:
     """Return the places of a tree's subtrees, but itself, that fit into ``room``."""
-    parts, inputs, outputs, hidden = room
-    return [
-        place
-        for place, (p, i, o, h) in enumerate(sizes)
-        if p <= parts and i <= inputs and o <= outputs and h <= hidden and place
-    ]
+    every = enumerate(sizes)
+    return [place for place, size in every if place and all(map(le, size, room))]

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from decimal import Decimal
 from typing import TypeVar
 
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from schema.experiment.brains import NoParameters, kinds_of
 from schema.parts import Parameter, PartType
@@ -46,18 +46,12 @@ class NetworkGenes:
     ) -> None:
         """Add hidden neurons, and connections from the neurons of new parts."""
         if len(new) == len(branches):
-            self._add_hidden_of_robot(draws, branches, rules)
+            for _ in range(draws.below(rules.max_hidden + 1)):
+                draws.pick(branches).hidden += (random_neuron(draws, self._types),)
         else:
             for part in new:
                 self._add_hidden_of_part(draws, part, branches, rules)
         wire(draws, new, branches, rules.p_connect_neurons)
-
-    def _add_hidden_of_robot(
-        self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
-    ) -> None:
-        """Add 0..max_hidden neurons."""
-        for _ in range(draws.below(rules.max_hidden + 1)):
-            draws.pick(branches).hidden += (random_neuron(draws, self._types),)
 
     def _add_hidden_of_part(
         self, draws: Draws, part: Branch, branches: Sequence[Branch], rules: BrainRules
@@ -107,13 +101,7 @@ def endpoints(
     branches: Iterable[B], *layers: Layer
 ) -> list[tuple[B, tuple[Layer, int]]]:
     """Return all neurons of some layers as ends of connections."""
-    return [
-        (branch, end)
-        for branch in branches
-        # Most parts have no neurons.
-        if branch.outputs or branch.hidden or branch.kind.inputs
-        for end in branch.neurons(*layers)
-    ]
+    return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
 
 
 def connect(
@@ -155,11 +143,8 @@ def delete_hidden_neurons(
     if not new_offsets:
         return
     for branch in branches:
-        if branch.connections:
-            genes = [
-                _renumbered(gene, branch, new_offsets) for gene in branch.connections
-            ]
-            branch.connections = tuple(filter(None, genes))
+        genes = [_renumbered(gene, branch, new_offsets) for gene in branch.connections]
+        branch.connections = tuple(filter(None, genes))
     for branch, after_deletion in new_offsets.items():
         branch.hidden = tuple(
             neuron
@@ -198,12 +183,10 @@ def delete_connections(
     draws: Draws, branches: Sequence[Branch], probability: float
 ) -> None:
     """Delete each connection with a probability."""
-    number = draws.number
     for branch in branches:
-        if branch.connections:
-            branch.connections = tuple(
-                [gene for gene in branch.connections if number() >= probability]
-            )
+        branch.connections = tuple(
+            gene for gene in branch.connections if draws.number() >= probability
+        )
 
 
 def vary_neurons(
@@ -211,24 +194,16 @@ def vary_neurons(
 ) -> None:
     """Move the parameters of every neuron towards random values."""
     for branch in branches:
-        # Most parts have no neurons.
-        if branch.outputs:
-            branch.outputs = _varied(draws, branch.outputs, epsilon, kinds)
-        if branch.hidden:
-            branch.hidden = _varied(draws, branch.hidden, epsilon, kinds)
+        branch.outputs = _varied(draws, branch.outputs, epsilon, kinds)
+        branch.hidden = _varied(draws, branch.hidden, epsilon, kinds)
 
 
 def _varied(
     draws: Draws, neurons: tuple[NeuronGene, ...], epsilon: float, kinds: NeuronKinds
 ) -> tuple[NeuronGene, ...]:
-    nearby = draws.nearby
     return tuple(
-        [
-            NeuronGene(
-                neuron.kind, nearby(kinds[neuron.kind], neuron.parameters, epsilon)
-            )
-            for neuron in neurons
-        ]
+        NeuronGene(kind, draws.nearby(kinds[kind], values, epsilon))
+        for kind, values in map(astuple, neurons)
     )
 
 

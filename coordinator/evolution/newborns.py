@@ -72,11 +72,17 @@ def newborn(
 
     ``why_not``: returns why the robot of an attempt is not viable, or nothing.
     """
-    parents = [encoding.kept(data) for data in work.parents]
+    given, parents = work.founder, [encoding.kept(data) for data in work.parents]
+    founder = None if given is None else encoding.from_bytes(given)
     reasons: list[str] = []
     for attempt in range(work.attempt, work.end):
-        why = encoding.no_child
-        genome = _conceived(work, attempt, parents, encoding, draws)
+        why, genome = encoding.no_child, founder
+        if parents:
+            rng = draws(attempt, Purpose.MATE)
+            genome = encoding.mate(parents[0], parents[-1], rng, work.birth)
+        elif genome is None:
+            rng = draws(attempt, Purpose.GENERATE)
+            genome = encoding.random(rng, work.birth)
         if genome is not None:
             try:
                 robot = encoding.develop(genome)
@@ -89,22 +95,6 @@ def newborn(
                     return Bred(work.birth, work.attempt, tuple(reasons), child)
         reasons.append(printable(why, LONGEST_REASON))
     return Bred(work.birth, work.attempt, tuple(reasons))
-
-
-def _conceived(
-    work: Breed,
-    attempt: int,
-    parents: list[object],
-    encoding: IslandEncoding,
-    draws: Draws,
-) -> object | None:
-    """Return the genome of an attempt; None if mating fails."""
-    if work.founder is not None:
-        return encoding.from_bytes(work.founder)
-    if not parents:
-        return encoding.random(draws(attempt, Purpose.GENERATE), work.birth)
-    rng = draws(attempt, Purpose.MATE)
-    return encoding.mate(parents[0], parents[-1], rng, work.birth)
 
 
 def founder(

@@ -23,9 +23,8 @@ from coordinator.evolution.selection import (
     Tournament,
     random_parents,
 )
-from schema.errors import ExperimentError, shown
+from schema.errors import ExperimentError, naming, shown
 from schema.experiment.brains import NoParameters
-from schema.experiment.check import naming
 from schema.experiment.document import Experiment, SelectionSection
 from schema.experiment.selection_rules import own_rule, rule_key
 from schema.plugins.contract import broken
@@ -191,17 +190,6 @@ def _with_parameters(
     if name == "parents":
         return lambda population, _, rng: function(population, rng, parameters)
     return lambda population, count, rng: function(population, count, rng, parameters)
-
-
-def select_parents(
-    population: Sequence[S], rng: np.random.Generator, rule: Rule
-) -> tuple[S, S]:
-    """Return two different parents, the one that gives its root first.
-
-    The population is in a reproducible order.
-    """
-    first, second = rule.places(2, population, rng)
-    return population[first], population[second]
 
 
 def select_survivors(

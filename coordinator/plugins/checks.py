@@ -33,11 +33,11 @@ from schema.errors import (
     ExperimentError,
     RevolveError,
     UnknownPlugin,
+    naming,
     nearest,
     one_line,
     shown,
 )
-from schema.experiment.check import naming
 from schema.experiment.document import (
     Experiment,
     body_space,

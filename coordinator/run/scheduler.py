@@ -18,7 +18,7 @@ from coordinator.dispatch.fleet import JobRouter
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
-from schema.wire.status import PeerFault, Queue, RunStatus, Status
+from schema.wire.status import Queue, RunStatus, Status
 
 SLACK = 2
 """Open requests per job that the workers may hold at a time."""
@@ -196,10 +196,7 @@ class RunScheduler:
             workers=self._useful("worker"),
             analyzers=self._useful("analyzer"),
             births_per_s=self._rate.per_s,
-            faults=tuple(
-                PeerFault(each.kind, each.peer, each.count)
-                for each in self.fleet.faults.counts
-            ),
+            faults=self.fleet.faults.counts,
             queues=_queues(self.fleet),
             silent=self.fleet.dispatch.silent(),
         )

@@ -22,8 +22,7 @@ from msgspec.structs import replace
 from coordinator.storage.disk import replace_bytes, replace_text
 from coordinator.storage.folder import forget_plugins, holds_run
 from coordinator.storage.hints import command
-from schema.errors import ExperimentError, RunFolderError
-from schema.experiment.check import naming
+from schema.errors import ExperimentError, RunFolderError, naming
 from schema.experiment.document import Experiment
 from schema.experiment.file import (
     Draft,

@@ -85,17 +85,9 @@ def prepare_process() -> None:
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     with contextlib.suppress(OSError, ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    _use_batch_policy()
     check_graphics()
-
-
-def _use_batch_policy() -> None:
-    """Let this thread and its children wait for the scheduler's next tick.
-
-    It has an effect only if no core is free. A worker has its next job ready, so a
-    message may wait, but each interruption costs a cold cache. It halves the switches
-    between processes. Another policy, if one is set, is kept.
-    """
+    # Where no core is free, this thread and its children wait for the scheduler's next
+    # tick: a worker has its next job ready, and each interruption costs a cold cache.
     if sys.platform == "linux" and os.sched_getscheduler(0) == os.SCHED_OTHER:
         with contextlib.suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))

@@ -1,12 +1,11 @@
 """Checks that the sections of an experiment are consistent."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import chain
 from math import ceil
 from urllib.parse import quote
 
-from schema.errors import ExperimentError, nearest, shown
+from schema.errors import ExperimentError, naming, nearest, shown
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.check_island import island_problems
 from schema.experiment.document import (
@@ -36,15 +35,6 @@ def check_experiment(experiment: Experiment, where: str) -> None:
     with naming(where):
         if problem := next(_problems(experiment), ""):
             raise ExperimentError(problem)
-
-
-@contextmanager
-def naming(where: str) -> Iterator[None]:
-    """Add the file of an experiment to the message of an error."""
-    try:
-        yield
-    except ExperimentError as error:
-        raise type(error)(f"{where}: {error}") from error
 
 
 def _problems(experiment: Experiment) -> Iterator[str]:

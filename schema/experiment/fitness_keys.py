@@ -11,7 +11,7 @@ from typing import Any
 
 from msgspec import to_builtins
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, naming
 from schema.experiment.changes import OF_FITNESS, between, with_value
 from schema.experiment.document import Experiment, Fitness, island_experiments
 from schema.experiment.settings import FITNESS, fitness_argument, fitness_function
@@ -60,10 +60,8 @@ def _check_changes(experiment: Experiment) -> None:
             values += [between(*pair, 0.41) for pair in pairwise(change.values)]
         for value in values:
             fitness = with_value(experiment, change.setting, value).fitness
-            try:
+            with naming(f"changes[{number}].values"):
                 fitness_argument(fitness_function(fitness), fitness)
-            except ExperimentError as error:
-                raise type(error)(f"changes[{number}].values: {error}") from None
 
 
 class _Watched:

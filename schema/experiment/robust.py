@@ -21,17 +21,6 @@ MOST_DRAWS = 100
 Degrees = Annotated[float, Meta(ge=-180, le=180)]
 NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
 """A standard deviation; within these bounds no arithmetic overflows."""
-RANGES = (
-    "friction",
-    "mass",
-    "torque",
-    "lift_m",
-    "tilt_deg",
-    "heading_deg",
-    "sensor_noise",
-    "actuator_noise",
-)
-"""Keys that are ranges, in the order of the draws."""
 
 
 class Robust(Section, frozen=True):
@@ -73,6 +62,10 @@ class Robust(Section, frozen=True):
     heading_deg: tuple[Degrees, Degrees] = (0.0, 0.0)
     sensor_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.05)
     actuator_noise: tuple[NoiseLevel, NoiseLevel] = (0.0, 0.01)
+
+
+RANGES = Robust.__struct_fields__[4:]
+"""Keys that are ranges, in the order of the draws."""
 
 
 def range_problems(robust: Robust | None) -> Iterator[str]:

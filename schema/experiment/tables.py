@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, check_most, cut, shown
+from schema.errors import ExperimentError, check_most, cut, naming, shown
 from schema.experiment.document import Experiment, island_count, island_experiments
 from schema.experiment.environment import scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
@@ -48,10 +48,8 @@ def swept(whole: Experiment, tables: Tables, where: str) -> tuple[Experiment, ..
         ExperimentError: as of ``converted``; too many points, or equal ones.
     """
     assert whole.sweep is not None
-    try:
+    with naming(where):
         points = sweep_points(whole.sweep)
-    except ExperimentError as error:
-        raise ExperimentError(f"{where}: {error}") from None
     width = len(str(len(points) - 1))
     experiments = []
     for number, point in enumerate(points):

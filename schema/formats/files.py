@@ -9,7 +9,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written. A packed rob
 import os
 from pathlib import Path
 
-from schema.errors import InvalidRobot, MalformedMessage, check_most, unreadable
+from schema.errors import InvalidRobot, check_most, naming, unreadable
 from schema.experiment.brains import types_of
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -126,18 +126,14 @@ def read_robot(
     else:
         try:
             is_packed = ending == PACKED
-            robot = decode_robot(
-                read_archive(path)[1][PROTOBUF] if is_packed else read_bytes(path)
-            )
-        except MalformedMessage as error:
-            raise MalformedMessage(f"{path}: {error}") from None
+            data = read_archive(path)[1][PROTOBUF] if is_packed else read_bytes(path)
         except OSError as error:
             raise InvalidRobot(f"{path}: {unreadable(error)}") from None
-    try:
+        with naming(path):
+            robot = decode_robot(data)
+    with naming(path):
         check_number(robot)
         check_robot(robot, space, kinds)
-    except InvalidRobot as error:
-        raise InvalidRobot(f"{path}: {error}") from None
     return robot
 
 
@@ -165,11 +161,9 @@ def write_robot(
     """
     ending = _ending(path, _WRITTEN)
     settings = settings or settings_of(None)
-    try:
+    with naming(path):
         check_number(robot)
         data = _written(robot, ending, settings)
-    except InvalidRobot as error:
-        raise InvalidRobot(f"{path}: {error}") from None
     most = MOST_MJCF_BYTES if ending == MJCF_ENDING else MOST_TEXT_BYTES
     if ending in _READ:
         check_most(len(data), most, "bytes", str(path), InvalidRobot)

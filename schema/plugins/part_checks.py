@@ -8,7 +8,7 @@ from typing import Literal, get_args, get_origin, get_type_hints
 import numpy as np
 from msgspec import convert, to_builtins
 
-from schema.errors import ExperimentError, cut, error_text, expectation, shown
+from schema.errors import ExperimentError, cut, error_text, expectation, naming, shown
 from schema.parts import Box, Joint, Motor, PartType, Sensor, Shape, Slot
 from schema.plugins.contract import broken, repeated
 from schema.plugins.origin import naming_plugin
@@ -31,12 +31,9 @@ def check_part_type(kind: PartType, where: str = "part type") -> None:
         ExperimentError: a piece that is not what it must be; a shape that raises,
             differs from call to call, or is not hashable.
     """
-    with naming_plugin(where, kind.shape):
-        try:
-            _check_consistency(kind)
-        except ExperimentError as error:
-            name = shown(kind.name)
-            raise ExperimentError(f"part type {name}: {error}") from error
+    name = f"part type {shown(kind.name)}"
+    with naming_plugin(where, kind.shape), naming(name, ExperimentError):
+        _check_consistency(kind)
 
 
 def _check_consistency(kind: PartType) -> None:

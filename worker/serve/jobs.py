@@ -8,7 +8,7 @@ from schema.errors import FAILURES, ExperimentError, MalformedMessage, error_tex
 from schema.experiment.changes import settings_at
 from schema.experiment.document import body_space
 from schema.experiment.identity import Identity
-from schema.experiment.settings import lasting
+from schema.experiment.settings import lasting, read_evaluation_settings
 from schema.plugins.load import load_function
 from schema.robot.brain import check_brain
 from schema.robot.results import Evaluation
@@ -24,7 +24,7 @@ from schema.wire.messages import (
     Result,
     Traced,
 )
-from worker.kinds import checked_evaluation
+from worker.kinds import checked
 from worker.robot.evaluation import evaluate, evaluate_traced
 from worker.serve.shards import Shards
 
@@ -66,7 +66,8 @@ def answer_evaluation(
             contract, or a sensor that has no stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
-    settings = settings_at(checked_evaluation(request.settings), work.point or 0)
+    whole = checked(read_evaluation_settings(request.settings))
+    settings = settings_at(whole, work.point or 0)
     robot = work.robot
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))

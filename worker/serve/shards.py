@@ -6,7 +6,7 @@ the digest of each advance with the recorded one.
 """
 
 from collections import OrderedDict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from schema.agent.service import Outlet
 from schema.errors import MalformedMessage, StateDiffers
 from schema.experiment.brains import types_of
-from schema.experiment.settings import ArenaSettings, read_arena_settings
+from schema.experiment.settings import read_arena_settings
 from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
@@ -26,7 +26,6 @@ from schema.wire.arena import (
     Changes,
     Live,
     Part,
-    PastAdvance,
     Rebuild,
 )
 from schema.wire.arena_state import ArenaState
@@ -34,7 +33,7 @@ from schema.wire.codec import decode, encode
 from schema.wire.messages import Request, StateMissing
 from worker.arena.changes import possible
 from worker.arena.world import World
-from worker.kinds import checked_arena
+from worker.kinds import checked
 
 Key = tuple[str, int, int]
 """Name of a shard: its run, its number, and the number of a part of it."""
@@ -92,7 +91,9 @@ class Shards:
             )
         settings, part = request.settings, work.part
         key = (request.run, work.island, part.number if part else 0)
-        _check_robots(work.changes, checked_arena(settings))
+        space, kinds = _types_of(checked(read_arena_settings(settings)))
+        for insertion in work.changes.insertions:
+            check_robot(insertion.robot, space, kinds)
         # Not kept while it changes, so that an error below leaves no broken shard.
         held, changes = self._taken(key, settings, work), work.changes
         if held is None and work.rebuild is not None:
@@ -104,7 +105,9 @@ class Shards:
             return StateMissing()
         with _closed_on_error(held.world) as world:
             if part is not None:
-                _exchange(world, part)
+                world.apply(Changes(part.departures))
+                if part.arrivals:
+                    world.take_in(decode(ArenaState, part.arrivals, ADVANCE_BYTES))
             world.apply(changes)
             if part is not None and part.checks_merges and not changes.insertions:
                 world.check_merges()
@@ -147,10 +150,7 @@ class Shards:
         else:
             world = self._world(settings, self._threads)
         with _closed_on_error(world):
-            if rebuild.living is None:
-                _repeat(world, rebuild.history)
-            else:
-                _approximate(world, rebuild.history, rebuild.living)
+            _repeat(world, rebuild)
             if world.step != work.from_step:
                 raise StateDiffers(
                     f"shard {work.island}: rebuilt to step {world.step}, must be "
@@ -160,13 +160,6 @@ class Shards:
             if is_only_snapshot and work.from_digest:
                 _check_digest(world.step, world.digest(), work.from_digest)
         return world
-
-
-def _exchange(world: World, part: Part) -> None:
-    """Give robots to other parts, and take in robots of them."""
-    world.apply(Changes(part.departures))
-    if part.arrivals:
-        world.take_in(decode(ArenaState, part.arrivals, ADVANCE_BYTES))
 
 
 def _advance(world: World, work: AdvanceShard) -> Advance:
@@ -211,35 +204,25 @@ def _closed_on_error(world: World) -> Iterator[World]:
         raise
 
 
-def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
-    space, kinds = _types_of(settings)
-    for insertion in changes.insertions:
-        check_robot(insertion.robot, space, kinds)
-
-
 _types_of = lru_cache(maxsize=64)(types_of)
 
 
-def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
-    """Repeat a history of the same platform, equal to the last bit."""
-    for past in history:
-        world.apply(past.changes)
-        digest = world.advance(past.until).digest
-        _check_digest(world.step, digest, past.digest)
+def _repeat(world: World, rebuild: Rebuild) -> None:
+    """Repeat a history, equal to the last bit if it is of the same platform.
 
-
-def _approximate(
-    world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
-) -> None:
-    """Repeat a history of another platform as exactly as this platform can.
-
-    Robots that are not among ``living`` are removed at the end. Robots that diverge
-    only on this platform are not restored.
+    That of another platform is repeated as exactly as this platform can. Robots that
+    are not among the living are removed at the end. Robots that diverge only on this
+    platform are not restored.
     """
-    for past in history:
-        world.apply(possible(past.changes, world.births))
-        world.advance(past.until)
-    world.apply(Changes(tuple(sorted(set(world.births) - set(living)))))
+    living = rebuild.living
+    for past in rebuild.history:
+        is_same = living is None
+        world.apply(past.changes if is_same else possible(past.changes, world.births))
+        digest = world.advance(past.until).digest
+        if is_same:
+            _check_digest(world.step, digest, past.digest)
+    if living is not None:
+        world.apply(Changes(tuple(sorted(set(world.births) - set(living)))))
 
 
 def _check_digest(step: int, digest: bytes, expected: bytes) -> None:

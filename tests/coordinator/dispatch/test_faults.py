@@ -1,7 +1,8 @@
 """Counts of faults: by kind and peer, limited, in printable lines."""
 
-from coordinator.dispatch.faults import OTHERS, FaultCount, PeerFaults
+from coordinator.dispatch.faults import OTHERS, PeerFaults
 from schema.limits import LONGEST_REASON, MOST_PEERS, MOST_SHOWN
+from schema.wire.status import PeerFault
 
 
 def test_faults_are_counted_and_told_once_but_for_late_answers() -> None:
@@ -10,9 +11,9 @@ def test_faults_are_counted_and_told_once_but_for_late_answers() -> None:
         assert kind in ("late", "malformed")
         faults.note("late" if kind == "late" else "malformed", peer, "job 7")
     assert faults.counts == (
-        FaultCount("late", "a", 2),
-        FaultCount("late", "b", 1),
-        FaultCount("malformed", "a", 1),
+        PeerFault("late", "a", 2),
+        PeerFault("late", "b", 1),
+        PeerFault("malformed", "a", 1),
     )
     assert (faults.total("late"), faults.total("refused")) == (3, 0)
     lines = faults.lines()
@@ -30,7 +31,7 @@ def test_peers_beyond_a_limit_are_counted_together() -> None:
     assert len(faults.counts) == 2 * (MOST_PEERS + 1)
     assert len(faults.lines()) == MOST_PEERS + 1
     assert faults.total("crowd") == 10 * MOST_PEERS
-    assert FaultCount("late", OTHERS, 9 * MOST_PEERS) in faults.counts
+    assert PeerFault("late", OTHERS, 9 * MOST_PEERS) in faults.counts
 
 
 def test_names_and_details_are_cut_and_printable() -> None:

@@ -12,7 +12,6 @@ from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import (
     Rule,
     rule_of,
-    select_parents,
     select_survivors,
 )
 from coordinator.evolution.selection import (
@@ -54,7 +53,8 @@ def rule(selection: SelectionSection, name: str) -> Rule:
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = SelectionSection(**settings)
     rng, tournament = np.random.default_rng(2), rule(selection, "parents")
-    return [numbers(select_parents(population, rng, tournament)) for _ in range(N)]
+    couples = (tournament.places(2, population, rng) for _ in range(N))
+    return [numbers([population[at] for at in couple]) for couple in couples]
 
 
 def test_of_equals_the_elder_comes_first() -> None:

@@ -17,7 +17,7 @@ from coordinator.evolution import rules as island_rules
 from coordinator.evolution.breeding import Individual
 from coordinator.evolution.check_rule import check_rule as check_rule_of
 from coordinator.evolution.members import Relatives
-from coordinator.evolution.rules import Rule, select_parents, select_survivors
+from coordinator.evolution.rules import Rule, select_survivors
 from schema.errors import ExperimentError, UnknownPlugin
 from schema.experiment.document import (
     PARENTS,
@@ -149,8 +149,7 @@ def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
     selection = SelectionSection(parents=path, parents_parameters={"first": 2})
     rule = rule_of(selection, "parents")
     living = population(3, 3, 3, 3, 3)
-    first, second = select_parents(living, np.random.default_rng(0), rule)
-    assert (first, second) == (living[2], living[4])
+    assert rule.places(2, living, np.random.default_rng(0)) == [2, 4]
 
 
 @pytest.mark.parametrize(
@@ -209,7 +208,7 @@ def test_rule_that_replaces_individuals_is_refused(lab: Callable[[str], str]) ->
     for call in (
         lambda: check_rule(parents),
         lambda: check_rule(survivors),
-        lambda: select_parents(everybody, rng, parents),
+        lambda: parents.places(2, everybody, rng),
         lambda: select_survivors(
             everybody[:2], everybody[2:], rng, SelectionSection(population=2), survivors
         ),
@@ -226,8 +225,7 @@ def test_rule_that_sorts_its_list_chooses_from_the_sorted_one(
     check_rule(survivors)
     everybody, rng = tuple(population(9, 5, 7, 4)), np.random.default_rng(0)
     # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
-    couple = select_parents(everybody, rng, parents)
-    assert couple == (everybody[3], everybody[1])
+    assert parents.places(2, everybody, rng) == [3, 1]
     two = SelectionSection(population=2)
     chosen = select_survivors(everybody[:2], everybody[2:], rng, two, survivors)
     assert chosen == (everybody[1], everybody[3])

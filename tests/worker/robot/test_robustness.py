@@ -24,19 +24,18 @@ from worker.robot.robustness import (
     ChangedSettings,
     all_changes,
     rejudge,
-    small_changes,
     summary,
 )
 
 SETTINGS = with_simulation(Simulation(window_steps=400, drop_m=0.01))
 CHANGE = ChangedSettings("none", SETTINGS)
+SMALL = [change for change in all_changes(SETTINGS) if change.is_small]
 
 
 def test_each_change_changes_one_thing_and_no_duration() -> None:
-    changes = small_changes(SETTINGS)
     before = asdict(SETTINGS.simulation)
     differing = []
-    for change in changes:
+    for change in SMALL:
         assert replace(change.settings, simulation=SETTINGS.simulation) == SETTINGS
         after = asdict(change.settings.simulation)
         differing.append({name for name in after if after[name] != before[name]})
@@ -45,10 +44,10 @@ def test_each_change_changes_one_thing_and_no_duration() -> None:
         assert world.brain_steps * world.timestep_s == pytest.approx(0.125)
     clocks = {"timestep_s", "brain_steps", "pose_steps", "window_steps"}
     assert differing == [clocks, clocks, {"friction"}, *[{"drop_m"}] * 8]
-    steps = [change.settings.simulation.timestep_s for change in changes[:2]]
+    steps = [change.settings.simulation.timestep_s for change in SMALL[:2]]
     assert steps == pytest.approx([0.0025, 0.001])
-    assert changes[2].settings.simulation.friction == pytest.approx(0.99)
-    lifts = [1000 * (one.settings.simulation.drop_m - 0.01) for one in changes[3:]]
+    assert SMALL[2].settings.simulation.friction == pytest.approx(0.99)
+    lifts = [1000 * (one.settings.simulation.drop_m - 0.01) for one in SMALL[3:]]
     assert len({*lifts}) == 8
     assert all(0 < lift < 0.2 for lift in lifts)
     assert sum(lifts) / 8 == pytest.approx(0.1, abs=0.05)
@@ -57,7 +56,7 @@ def test_each_change_changes_one_thing_and_no_duration() -> None:
 def test_all_changes_by_hand() -> None:
     changes = all_changes(SETTINGS)
     counts: dict[str, int] = {}
-    for change in changes:
+    for change in SMALL:
         counts[change.group] = counts.get(change.group, 0) + 1
     assert counts == {
         "time step": 2, "friction": 4, "start": 12, "mass": 2, "torque": 2,
@@ -122,7 +121,7 @@ def test_failed_evaluations_have_no_fitness(
             raise failure("slipped away")
         return Evaluation(0.5, 0.0, 0.0, 12.0)
 
-    judgements = rejudge(turtle, small_changes(SETTINGS), fake)
+    judgements = rejudge(turtle, SMALL, fake)
     found = [fitness for _, fitness in judgements]
     assert found == [0.5, 0.5, None, *[0.5] * 8]
 

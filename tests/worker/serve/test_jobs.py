@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-import msgspec
 import pytest
 from msgspec.structs import replace
 
@@ -36,7 +35,7 @@ from schema.wire.messages import (
     Work,
 )
 from worker.arena.world import World
-from worker.kinds import checked_evaluation
+from worker.kinds import checked
 from worker.robot.evaluation import evaluate
 from worker.serve.jobs import Jobs, call_function
 from worker.serve.shards import Shards
@@ -84,14 +83,14 @@ def test_invalid_requests_are_rejected(turtle: Robot) -> None:
 def test_unknown_measure_is_refused() -> None:
     settings = replace(SETTINGS, measures=Measures(names=("height", "turnin")))
     with pytest.raises(ExperimentError, match=r"did you mean 'turning'\?"):
-        checked_evaluation(msgspec.json.encode(settings))
+        checked(settings)
 
 
 def test_faulty_measure_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(worker.measures.BUILT_IN, "faulty", lambda _trace: float("nan"))
     settings = replace(SETTINGS, measures=Measures(names=("height", "faulty")))
     with pytest.raises(ExperimentError, match=r"test_jobs.py:\d+: must return a fin"):
-        checked_evaluation(msgspec.json.encode(settings))
+        checked(settings)
 
 
 LAB = """
