@@ -9,6 +9,7 @@ from analysis.extras import extra
 from analysis.render.flags import FILM_ENDINGS, PAGE_ENDING
 from schema.agent.flags import Flags
 from schema.plugins.permission import allow
+from schema.tables.description import check_folder
 
 
 def main(arguments: list[str]) -> int:
@@ -77,6 +78,8 @@ def _view(options: argparse.Namespace) -> int:
 
     A film of an arena needs no viewer.
     """
+    if options.run is not None and options.connect is None:
+        check_folder(options.run)  # before a library that may be missing
     ending = options.save.suffix.lower() if options.save is not None else ""
     if ending == PAGE_ENDING:
         with extra("pages need", "pictures"):

@@ -15,7 +15,12 @@ from schema.robot.trace import Floats
 
 T = TypeVar("T")
 _TLS = re.compile(r"--tls-(\w+)")
-_FLAG = re.compile(r"--(births|connect|experiment|fleet|out|plugins|seed|workers)\b")
+_FLAG = re.compile(
+    r"--(births|colours|connect|experiment|figures|fleet|format|out|plugins|seed|style|"
+    r"width|workers)\b"
+)
+_RESUME = re.compile("to resume it: revolve resume [^;]*")
+"""Advice about a folder that is used."""
 
 
 def whole_number(
@@ -66,6 +71,7 @@ def naming_arguments() -> Iterator[None]:
         yield
     except RevolveError as error:
         line = _TLS.sub(lambda flag: f"$REVOLVE_TLS_{flag[1].upper()}", str(error))
+        line = _RESUME.sub("revolve.read opens it, revolve.resume continues it", line)
         raise type(error)(_FLAG.sub(r"\1", line)) from None
 
 

@@ -1,5 +1,6 @@
 """Analyses of runs as the Python API has them."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import pyarrow as pa
@@ -47,22 +48,39 @@ class Analysis:
 
 
 def analyze(
-    *runs: Run | str | Path, out: str | Path = "report", progress: bool | None = None
+    *runs: Run | str | Path,
+    out: str | Path = "report",
+    figures: Iterable[str] = (),
+    width: str = "page",
+    format: Iterable[str] = ("pdf", "png"),  # noqa: A002 - as the flag
+    style: str = "light",
+    colours: Iterable[str] = (),
+    progress: bool | None = None,
 ) -> Analysis:
     """Measure runs, draw the figures and write a report, as ``revolve analyze`` does.
 
     Args:
         runs: runs, or folders that contain some.
         out: folder to write to.
+        figures: numbers of those to draw, such as ``["6.3", "H"]``; empty: all.
+        width: of figures: ``page``, 7.2 inches, or a paper's ``column``, 3.5 inches.
+        format: of the files of figures, of ``pdf``, ``png`` and ``svg``.
+        style: look of figures and report: ``light``, ``dark`` or ``print``.
+        colours: of the experiments in the order of legends, or the name of a colour
+            map of matplotlib; empty: those of the thesis.
         progress: show progress on standard error, and the findings; None: in
             notebooks.
 
     Raises:
         RunFolderError: no run is found, or the folder cannot be written.
-        RevolveError: a library is missing; the message says how to install it.
+        RevolveError: a library is missing, and the message says how to install it; no
+            such figure, width, format, style or colour.
     """
-    folders = [str(each.folder if isinstance(each, Run) else each) for each in runs]
-    run_command(
-        ["analyze", *folders, "--out", str(out)], is_quiet=is_silent(progress=progress)
-    )
+    words = ["analyze", *(str(getattr(each, "folder", each)) for each in runs)]
+    words += ["--out", str(out), "--width", str(width), "--style", str(style)]
+    lists = {"--figures": figures, "--format": format, "--colours": colours}
+    for flag, names in lists.items():
+        if text := ",".join(map(str, names)):
+            words += [flag, text]
+    run_command(words, is_quiet=is_silent(progress=progress))
     return Analysis(out)

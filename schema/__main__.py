@@ -28,9 +28,10 @@ def main(arguments: list[str]) -> int:
         from analyzer.report import analyze
 
         vetting = experiment.vetting if experiment else Vetting()
-        why = analyze(robot, types_for(settings)[0], vetting).reason
+        space, _ = types_for(settings)
+        why = analyze(robot, space, vetting).reason
         verdict = f"not viable: {why}" if why else "viable"
-        print(f"{options.file}: well formed; {_summary(robot)}; {verdict}")
+        print(f"{options.file}: well formed; {_summary(robot, space)}; {verdict}")
     elif options.command == "convert":
         write_robot(robot, options.output, settings)
         print(f"{options.output}: written")
@@ -93,12 +94,19 @@ def _show_contents(file: Path) -> None:
         print(f"plug-in {printable(name)}, source digest {printable(digest)}")
 
 
-def _summary(robot: Robot) -> str:
-    brain = robot.brain
+def _summary(robot: Robot, space: BodySpace) -> str:
+    """Return the numbers of parts, joints, motors, neurons and connections."""
+    brain, parts = robot.brain, counted(len(robot.parts), "part")
+    kinds = [(space[part.kind], part.parameters) for part in robot.parts]
+    jointed = [kind for kind, values in kinds if kind.shape(values).joint is not None]
+    driven = sum(kind.motor is not None for kind in jointed)
+    joints = counted(len(jointed), "joint")
+    if jointed:
+        joints += f", {driven} with {'a motor' if driven == 1 else 'motors'}"
     neurons = [counted(brain.count(layer), layer) for layer in ("input", "output")]
     hidden = counted(brain.count("hidden"), "hidden neuron")
     edges = counted(len(brain.connections), "connection")
-    return ", ".join([counted(len(robot.parts), "part"), *neurons, hidden, edges])
+    return ", ".join([parts, joints, *neurons, hidden, edges])
 
 
 def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> None:
@@ -135,5 +143,5 @@ def _show(robot: Robot, space: BodySpace, kinds: NeuronKinds, title: str) -> Non
                 source = f"<- {edge.weight:g} × {names[edge.source]}"
                 branch.add(Text(source, style="dim"))
     console = Console()
-    console.print(Text(f"{title}: {_summary(robot)}"))
+    console.print(Text(f"{title}: {_summary(robot, space)}"))
     console.print(trees[0])

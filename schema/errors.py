@@ -7,10 +7,14 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
+from itertools import islice
+from pathlib import Path
 from typing import Any, Literal
 
 from schema.limits import LONGEST_REASON, MOST_SHOWN, printable
 
+_MOST_NAMES = 1000
+"""Names in a folder among which the nearest is searched."""
 NO_MESSAGE = "(no message)"
 """Text of an error without one: an empty reason would mean that nothing failed."""
 
@@ -155,11 +159,28 @@ def cut(text: str) -> str:
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
-def unreadable(error: OSError | UnicodeDecodeError) -> str:
-    """Return why a file cannot be read, as the end of a message."""
+def unreadable(error: OSError | UnicodeDecodeError, near: str = "") -> str:
+    """Return why a file cannot be read, as the end of a message.
+
+    Of a missing file it ends with ``near``, or with the file of the nearest name.
+    """
     if isinstance(error, UnicodeDecodeError):
         return f"cannot be read: not UTF-8 at byte {error.start}"
-    return f"cannot be read: {error.strerror or error}"
+    if not isinstance(error, FileNotFoundError):
+        near = ""
+    elif not near and error.filename:
+        near = near_files(Path(error.filename))
+    return f"cannot be read: {error.strerror or error}{near}"
+
+
+def near_files(missing: Path, pattern: str = "*") -> str:
+    """Return ``; did you mean 'x'?`` for a path of similar name beside a missing one.
+
+    ``pattern`` is that of ``Path.glob``: "*/" are folders.
+    """
+    names = (each.name for each in missing.parent.glob(pattern))
+    found = get_close_matches(missing.name[:MOST_SHOWN], islice(names, _MOST_NAMES), 1)
+    return f"; did you mean {str(missing.with_name(found[0]))!r}?" if found else ""
 
 
 def expectation(message: str) -> str:

@@ -113,6 +113,8 @@ class FigureWriter:
         files = [stem.with_name(f"{stem.name}.{kind}") for kind in self._formats]
         caption = figure.caption
         text = caption if isinstance(caption, str) else caption(tables)
+        words = f"{figure.title}. {text}".strip() + "\n"
+        stem.with_name(f"{stem.name}.txt").write_text(words, "utf-8")
         self.drawn.append(DrawnFigure(figure, text, files, picture))
 
     def add_film(self, robot: RobotPicture) -> Film:

@@ -25,6 +25,7 @@ from schema.tables.description import (
     DETAILS,
     STATE,
     groups_of,
+    check_folder,
     read_description,
     read_state,
 )
@@ -126,8 +127,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[LoadedRun], list[LeftOut]]:
     """
     folders: set[Path] = set()
     for root in roots:
-        if not root.is_dir():
-            raise RunFolderError(f"{root}: no such folder")
+        check_folder(root)
         folders |= {path.parent for path in root.glob(f"**/{DETAILS}")}
         finished = root.glob(f"**/{FINISHED}/experiment=*/run=*")
         folders |= {path.parents[2] for path in finished}

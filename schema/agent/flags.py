@@ -41,6 +41,13 @@ class Flags(argparse.ArgumentParser):
         Flags.last_error = f"{self.prog}: {message} (see {self.prog} --help)"
         self.exit(2, f"{self.last_error}\n")
 
+    def _check_value(self, action: argparse.Action, value: object) -> None:
+        """Raise unless a value is one of its flag's choices; name the nearest."""
+        if action.choices is not None and value not in action.choices:
+            names = list(map(str, action.choices))
+            rule = f"must be one of {', '.join(names)}, got {str(value)[:80]!r}"
+            raise argparse.ArgumentError(action, rule + nearest(value, names))
+
     def format_help(self) -> str:
         """Return the help, with the examples at the end."""
         lines = "".join(f"  {example}\n" for example in self.examples)

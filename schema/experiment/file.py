@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import msgspec
 
-from schema.errors import ExperimentError, nearest
+from schema.errors import ExperimentError, near_files, nearest
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
 from schema.experiment.sweep import sweep_problems
 from schema.experiment.tables import Tables, at_point, converted, swept
-from schema.plugins.bounded import near_files, parse_toml, text_of
+from schema.plugins.bounded import parse_toml, text_of
 from schema.plugins.parameters import known_keys
 from schema.plugins.permission import allow_references
 
@@ -129,9 +129,8 @@ def source_text(source: str) -> tuple[str, str]:
     """
     if source.endswith(".toml"):
         path = Path(source)
-        near = near_files(path)
-        if not path.exists() and path.stem in shipped_experiments():
-            near = f"; did you mean {path.stem!r}, which is shipped?"
+        is_shipped = path.stem in shipped_experiments()
+        near = f"; did you mean {path.stem!r}, which is shipped?" * is_shipped
         return text_of(path, source, near), source
     check_source(source, shipped_experiments())
     folder = resources.files("schema.experiment") / "shipped"
@@ -148,7 +147,7 @@ def check_source(source: str, shipped: Collection[str]) -> None:
         raise ExperimentError(f"{source}: is a folder; {what}")
     if path.is_file() or (path.suffix and not beside.is_file()):
         rule = f"the file of an experiment must end in .toml, got {path.suffix!r}"
-        missing = f", and there is no such file{near_files(path)}"
+        missing = f", and there is no such file{near_files(path, '*.toml')}"
         raise ExperimentError(f"{source}: {rule}{'' if path.is_file() else missing}")
     near = nearest(source, [*shipped, *([str(beside)] if beside.is_file() else ())])
     known = f"shipped are {', '.join(shipped)}, or give a path to a .toml file"

@@ -13,7 +13,7 @@ from schema.experiment.document import Experiment, island_count, island_experime
 from schema.experiment.environment import scenery_problem
 from schema.experiment.sweep import Point, settings_problem, sweep_points, with_point
 from schema.limits import MOST_ISLANDS
-from schema.plugins.bounded import near_files, parse_toml, text_of
+from schema.plugins.bounded import parse_toml, text_of
 from schema.plugins.parameters import read_parameters
 
 Tables = dict[str, Any]
@@ -91,7 +91,7 @@ def _read_calibration(tables: Tables, where: str) -> None:
     if not isinstance(named, str):
         return
     path = Path(where).parent / named
-    text = text_of(path, f"{where}: calibration: {named}", near_files(path))
+    text = text_of(path, f"{where}: calibration: {named}")
     found = parse_toml(text, str(path))
     if list(found) != ["calibration"]:
         rule = "must hold [[calibration]] tables and nothing else"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from schema.errors import ExperimentError, RevolveError, check_most, nearest, unreadable
+from schema.errors import ExperimentError, RevolveError, check_most, unreadable
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DEPTH,
@@ -57,13 +57,7 @@ def text_of(
         # With the byte order mark of editors of Windows.
         return read_bytes(path, most).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        ending = near if isinstance(error, FileNotFoundError) else ""
-        raise kind(f"{where}: {unreadable(error)}{ending}") from None
-
-
-def near_files(missing: Path) -> str:
-    """Return ``; did you mean 'x'?`` for a TOML file with a similar name beside it."""
-    return nearest(str(missing), [str(each) for each in missing.parent.glob("*.toml")])
+        raise kind(f"{where}: {unreadable(error, near)}") from None
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from tempfile import mkdtemp
 from types import ModuleType
 from typing import Never
 
-from schema.errors import ExperimentError, UnknownPlugin, shown
+from schema.errors import ExperimentError, UnknownPlugin, near_files, shown
 from schema.robot.archive import PACKED, SOURCES, read_archive
 
 BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness", "worker.tasks")
@@ -256,7 +256,7 @@ def _source(top: str) -> list[Path] | None:
 def _allow_file(file: Path, where: str) -> None:
     """Allow a file as a module of its own name, unless that is another module's."""
     if not file.is_file():
-        raise UnknownPlugin(f"{where}: no such file: {file}")
+        raise UnknownPlugin(f"{where}: no such file: {file}{near_files(file)}")
     top = file.stem
     _check_name(top)
     named, found = _copies.get(top) or _allowed.get(top), _source(top)

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec import structs
 
-from schema.errors import RunFolderError, expectation, unreadable
+from schema.errors import RunFolderError, expectation, near_files, unreadable
 from schema.experiment.identity import WHOLE, Group, Origin
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
 from schema.plugins.kept import KeptPlugin, allow_kept
@@ -178,7 +178,7 @@ def _common(own: RunDetails) -> tuple[object, ...]:
 def check_folder(folder: Path) -> None:
     """Raise ``RunFolderError`` unless a folder is there, and no file."""
     if not folder.exists():
-        raise RunFolderError(f"{folder}: no such folder")
+        raise RunFolderError(f"{folder}: no such folder{near_files(folder, '*/')}")
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: must be a folder, got a file")
 

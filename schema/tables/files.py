@@ -22,7 +22,12 @@ from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.checksums import digest_of, read_digests
 from schema.tables.columns import TABLES, completed
-from schema.tables.description import groups_of, read_description, run_columns
+from schema.tables.description import (
+    check_folder,
+    groups_of,
+    read_description,
+    run_columns,
+)
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -263,8 +268,7 @@ def read_table(
         RunFolderError: no such folder, a file that is damaged or cannot be read, or one
             of another version.
     """
-    if not folder.is_dir():
-        raise RunFolderError(f"{folder}: no such folder")
+    check_folder(folder)
     if groups := groups_of(folder):
         return joined(groups, table, columns, where)
     schema = TABLES[table]

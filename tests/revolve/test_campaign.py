@@ -188,9 +188,9 @@ def test_latex_is_the_comparison_of_the_report(campaign: Path, tmp_path: Path) -
         (["{1}", "--to", "csv"], r"no run in or below this folder"),
         (
             ["{0}", "--to", "csv", "--table", "birth"],
-            r"--table: invalid choice: 'b",
+            r"--table: must be one of .*; did you mean 'births'",
         ),
-        (["{0}", "--to", "xlsx"], r"--to: invalid choice: 'xlsx'"),
+        (["{0}", "--to", "xlsx"], r"--to: must be one of csv, .*got 'xlsx'"),
         (["{0}"], r"required: --to"),
         (["--to", "csv"], r"required: FOLDER"),
         (

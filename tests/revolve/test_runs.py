@@ -148,7 +148,7 @@ def test_notebook_gets_births_of_all_islands_and_the_best_sample(
 def test_used_and_missing_folders_raise_the_line_of_the_command(
     done: rv.Run, tmp_path: Path
 ) -> None:
-    with pytest.raises(rv.RunFolderError, match="already holds a run"):
+    with pytest.raises(rv.RunFolderError, match=r"a run; revolve[.]read opens it"):
         rv.run("scenario1", births=15, out=done.folder)
     with pytest.raises(rv.RunFolderError, match="no run in or below this folder"):
         rv.read(tmp_path)
@@ -168,17 +168,22 @@ def test_analysis_has_tables_and_a_report(
         rv.analyze()
     with pytest.raises(rv.RunFolderError, match="no such folder"):
         rv.analyze(tmp_path / "missing")
+    with pytest.raises(rv.RevolveError, match=r"style: must be .*'drak'; did you"):
+        rv.analyze(done, style="drak")
     out = tmp_path / "report"
 
     def write(words: list[str], *, is_quiet: bool) -> None:
-        assert words == ["analyze", str(done.folder), "a", "--out", str(out)]
+        look = ["--out", str(out), "--width", "page", "--style", "dark"]
+        lists = ["--figures", "6.3,H", "--format", "pdf"]
+        assert words == ["analyze", str(done.folder), "a", *look, *lists]
         assert is_quiet
         (out / "measures").mkdir(parents=True)
         pq.write_table(done.births, out / "measures" / "robots.parquet")
         (out / "report.html").write_text("<!doctype html>")
 
     monkeypatch.setattr("revolve.reports.run_command", write)
-    found = rv.analyze(done, "a", out=out)
+    wanted = ("6.3", "H")
+    found = rv.analyze(done, "a", out=out, figures=wanted, format=["pdf"], style="dark")
     assert found.report.read_text().startswith("<!")
     assert found.table("robots").num_rows == BIRTHS
     with pytest.raises(rv.RunFolderError, match="did you mean 'robots'"):

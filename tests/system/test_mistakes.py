@@ -77,8 +77,10 @@ MISTAKES = [
     ("compare later later", "was written by another version of Revolve"),
     ("analyze empty", "empty: no run in or below"),
     ("analyze nowhere", "nowhere: no such folder"),
+    ("analyze rnu", "rnu: no such folder; did you mean 'run'?"),
     ("analyze run --out file", "file: must be a folder, got a file"),
     # Views
+    ("view nowhere", "nowhere: no such folder"),
     ("view nowhere --save a.rrd", "nowhere: no such folder"),
     ("view run --robot 0:9999 --save a.rrd", "0:9999: no robot of that name was born"),
     ("view run --save a.avi", "--save a.avi: must end in .rrd"),
@@ -89,10 +91,10 @@ MISTAKES = [
     ("view --connect tcp/127.0.0.1:1 --save a.rrd", "no hub at"),
     ("view nowhere --serve 9876", "must be HOST:PORT"),
     ("view nowhere --follow x", "must be N or ISLAND:N in whole numbers >= 0"),
-    ("view nowhere --ancestry", "needs --robot best"),
+    ("view run --ancestry", "needs --robot best"),
     ("view --connect tcp/127.0.0.1:1 --robot best", "a run folder only"),
     # Documents about arenas
-    ("arena lst --json", "invalid choice: 'lst' (choose from 'list', "),
+    ("arena lst --json", "ACTION: must be one of list, "),
     ("arena --json list", "no flag '--json' (see revolve arena --help)"),
     ("arena pause --json", "arena pause: no flag '--json'"),
     *(
@@ -113,6 +115,7 @@ MISTAKES = [
     (f"arena remove 0:{2**64}", "must be N or ISLAND:N in whole numbers >= 0, got"),
     # Robots
     ("robot check nowhere.yaml", "nowhere.yaml: cannot be read"),
+    ("robot check cro.yaml", "did you mean 'cor.yaml'?"),
     ("robot check exp.yaml", "exp.yaml"),
     ("robot check cor.yaml", "'Core'"),
     ("robot check open.yaml", "open.yaml"),
