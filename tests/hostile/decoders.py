@@ -13,8 +13,8 @@ from typing import Any
 from msgspec.structs import replace
 
 import tests.analyzers
-from analysis.viewer.received import received_poses
 from analysis.viewer.scene import Scene, scene_of
+from analysis.viewer.watch import received_poses
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.evolution.encodings import encoding_of
 from coordinator.islands.events import JournalledEvent

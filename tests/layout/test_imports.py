@@ -24,7 +24,6 @@ PERMITTED = {
         "schema/mjcf/*.py",
         "schema/experiment/scenery.py",
         "schema/formats/mjcf.py",
-        "schema/formats/mjcf_export.py",
         "schema/formats/urdf.py",
         "worker/**/*.py",
         "analysis/render/motion.py",
@@ -37,7 +36,7 @@ PERMITTED = {
     "numba": ("schema/robot/body_distance.py",),
     "matplotlib": ("analysis/figures/*.py",),
     "networkx": ("coordinator/islands/topology.py",),
-    "cmaes": ("coordinator/evolution/learners/built_in.py",),
+    "cmaes": ("coordinator/evolution/learners/learner.py",),
 }
 # Reference implementations for tests and developer tools: no room imports them.
 TEST_ONLY = {

@@ -2,7 +2,7 @@
 
 import pyarrow as pa
 
-from revolve.cli.winners import _fittest_first, _recorded
+from revolve.cli.changes import _fittest_first, _recorded
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 

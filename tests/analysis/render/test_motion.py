@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from analysis.render.marks import way_marks, with_scale
+from analysis.render.film import way_marks, with_scale
 from analysis.render.motion import frames, recorded, side_by_side
 from analysis.render.picture import RobotRenderer
 from schema.formats.files import settings_of

@@ -11,9 +11,8 @@ from msgspec.structs import replace
 
 from analysis.viewer.live import Ended, LiveMessage
 from analysis.viewer.output import Output
-from analysis.viewer.received import received_poses
 from analysis.viewer.scene import scene_of
-from analysis.viewer.watch import LiveView, watch
+from analysis.viewer.watch import LiveView, received_poses, watch
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId

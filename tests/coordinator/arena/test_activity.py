@@ -5,7 +5,7 @@ from math import dist
 import numpy as np
 import pytest
 
-from coordinator.arena.activity import Activity
+from coordinator.arena.decisions import Activity
 from schema.plugins.arena_rules import Meeting
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Judgement

@@ -7,9 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.arena.arena import Arena
-from coordinator.arena.check_rules import check_rules
-from coordinator.arena.rules import BUILT_IN, CheckedRules, load_rules
-from coordinator.arena.thesis_rules import ThesisRules
+from coordinator.arena.kinds import check_rules
+from coordinator.arena.rules import BUILT_IN, CheckedRules, ThesisRules, load_rules
 from schema.errors import ExperimentError, one_line
 from schema.plugins.arena_rules import (
     ArenaView,

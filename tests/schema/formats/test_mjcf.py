@@ -15,8 +15,7 @@ from schema.errors import InvalidRobot
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.formats.files import settings_of
-from schema.formats.mjcf import DIGEST, robot_from_mjcf, robot_to_mjcf
-from schema.formats.mjcf_export import add_sensors
+from schema.formats.mjcf import DIGEST, add_sensors, robot_from_mjcf, robot_to_mjcf
 from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN, CORE, Box, Sensor, Shape, constant_shape

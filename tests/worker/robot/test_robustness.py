@@ -18,8 +18,7 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from tests.worker.evaluations import with_simulation
-from worker.robot.disturbances import disturbances
-from worker.robot.evaluation import evaluate
+from worker.robot.evaluation import disturbances, evaluate
 from worker.robot.robustness import (
     ChangedSettings,
     all_changes,
