@@ -93,16 +93,6 @@ def best(
     return sorted(places, key=lambda at: _order(population[at]))[:count]
 
 
-def random_survivors(
-    population: Sequence[Selectable],
-    count: int,
-    rng: np.random.Generator,
-    _parameters: None,
-) -> Sequence[int]:
-    """Return uniformly drawn survivors."""
-    return BufferedRng(rng).sample(range(len(population)), count)
-
-
 PARENT_RULES: dict[str, ParentSelection] = {
     "tournament": tournament,
     "random": random_parents,
@@ -110,7 +100,9 @@ PARENT_RULES: dict[str, ParentSelection] = {
 """Built-in selections of parents; ``none`` selects no parents."""
 SURVIVOR_RULES: dict[str, SurvivorSelection] = {
     "best": best,
-    "random": random_survivors,
+    "random": lambda population, count, rng, _: BufferedRng(rng).sample(
+        range(len(population)), count
+    ),
 }
 """Built-in selections of survivors."""
 

@@ -20,6 +20,7 @@ from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Proximity, RobotBounds
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.states import (
+    PLAUSIBLE,
     Layout,
     Pairs,
     RobotRows,
@@ -223,7 +224,10 @@ class ArenaPopulation:
     def _merge_pairs(self, rollout: Rollout) -> Pairs:
         """Return the pairs to merge now; computes them for all checks ahead."""
         if rollout.moment not in rollout.merge_pairs:
-            ahead = rollout.merges_ahead()
+            is_broken = not rollout.max_velocity <= PLAUSIBLE
+            now = rollout.moment
+            # Only the present moment if the physics breaks in the interval.
+            ahead = range(now, now + 1 if is_broken else rollout.after_merges)
             span = slice(ahead.start, ahead.stop)
             bounds = RobotBounds(
                 self.layout, rollout.states[span], rollout.velocities[span]

@@ -277,6 +277,7 @@ class Rollout:
 
     Attributes:
         plan: steps to each moment from the one before.
+        after_merges: the moment after the last check for merges.
         moment: the one that is being handled.
         states: (K, W) in the order of the layout.
         velocities: (K, V) absolute, as ``Layout.velocities``.
@@ -288,7 +289,7 @@ class Rollout:
     def __init__(self, plan: tuple[int, ...], is_merge: tuple[bool, ...]) -> None:
         self.plan = plan
         checks = [moment for moment, is_due in enumerate(is_merge) if is_due]
-        self._after_merges = max(checks, default=-1) + 1
+        self.after_merges = max(checks, default=-1) + 1
         self.moment = 0
         self.states = self.velocities = np.zeros((len(plan), 0))
         self.max_velocity = 0.0
@@ -299,15 +300,6 @@ class Rollout:
     def state(self) -> Floats:
         """All clusters' state at the present moment, (W,)."""
         return np.asarray(self.states[self.moment])
-
-    def merges_ahead(self) -> range:
-        """Return the moments from the present one to the last check for merges.
-
-        Only the present one if the physics breaks in the interval.
-        """
-        if not self.max_velocity <= PLAUSIBLE:
-            return range(self.moment, self.moment + 1)
-        return range(self.moment, self._after_merges)
 
     def read(self, layout: Layout) -> None:
         """Read all states; drops pairs that were computed from the old ones."""
