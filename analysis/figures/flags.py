@@ -69,8 +69,8 @@ def parser(_command: str = "analyze") -> Flags:
         help="slot that labels a part in the tree edit distance between bodies: its "
         "parent's, as in the thesis (default), or its own, as in the published code",
     )
-    what = "number of processes, which measure runs in parallel (default: of cores)"
-    add_count(flags, "--processes", None, what)
+    what = "number of processes, which measure runs in parallel"
+    add_count(flags, "--processes", None, f"{what} (default: number of cores)")
     add_plugins(flags)
     return flags
 

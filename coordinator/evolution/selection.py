@@ -93,6 +93,16 @@ def best(
     return sorted(places, key=lambda at: _order(population[at]))[:count]
 
 
+def random_survivors(
+    population: Sequence[Selectable],
+    count: int,
+    rng: np.random.Generator,
+    _parameters: None,
+) -> Sequence[int]:
+    """Return uniformly drawn survivors."""
+    return BufferedRng(rng).sample(range(len(population)), count)
+
+
 PARENT_RULES: dict[str, ParentSelection] = {
     "tournament": tournament,
     "random": random_parents,
@@ -100,9 +110,7 @@ PARENT_RULES: dict[str, ParentSelection] = {
 """Built-in selections of parents; ``none`` selects no parents."""
 SURVIVOR_RULES: dict[str, SurvivorSelection] = {
     "best": best,
-    "random": lambda population, count, rng, _: BufferedRng(rng).sample(
-        range(len(population)), count
-    ),
+    "random": random_survivors,
 }
 """Built-in selections of survivors."""
 

@@ -82,7 +82,9 @@ def test_only_the_figures_asked_for_are_drawn(tmp_path: Path) -> None:
     analyze(parser("analyze").parse_args(words), words, no_pictures)
     assert sorted((out / "figures").iterdir()) == [
         out / "figures" / "6.14a-fitness-by-the-number-of-extremities.svg",
+        out / "figures" / "6.14a-fitness-by-the-number-of-extremities.txt",
         out / "figures" / "6.3-fitness-over-births.svg",
+        out / "figures" / "6.3-fitness-over-births.txt",
         kept,
     ]
     page = (out / "report.html").read_text("utf-8")

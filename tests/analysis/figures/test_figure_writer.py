@@ -4,6 +4,7 @@ import io
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,13 @@ def test_a_left_out_figure_removes_only_its_own_earlier_files(tmp_path: Path) ->
     for number in ("G-ancestry", "6.2"):
         writer.add(missing(number, "there is none"), {})
     assert [path.name for path in tmp_path.glob("*.png")] == ["G-ancestry-of-b.png"]
+
+
+def test_a_caption_is_a_text_file_beside_its_figure(tmp_path: Path) -> None:
+    figure = replace(tree_of("b"), caption=lambda tables: f"Of {tables['name']}.")
+    FigureWriter(tmp_path).add(figure, {"name": table("runs", [])})
+    text = (tmp_path / "G-ancestry-of-b.txt").read_text()
+    assert text.startswith("Ancestry. Of pyarrow.Table")
 
 
 def test_figures_of_robots_name_what_is_missing(tmp_path: Path) -> None:
