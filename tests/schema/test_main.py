@@ -57,7 +57,7 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 
 
 def test_a_viable_robot(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    body = "3 parts, 2 joints, 1 with a motor"
+    body = "3 parts, 1 joint, 1 with a motor"
     sizes = f"{body}, 6 inputs, 1 output, 0 hidden neurons, 1 connection"
     assert said(capsys, str(path)) == f"{path}: well formed; {sizes}; viable"
 
