@@ -22,8 +22,8 @@ except RevolveError as error:
     ("library", "words", "extra"),
     [
         ("PIL", ("robot render", "best.yaml", "best.png"), "pictures"),
-        ("PIL", ("view", "run", "--save", "arena.gif"), "pictures"),
-        ("rerun", ("view", "run", "--save", "run.rrd"), "view"),
+        ("PIL", ("view", ".", "--save", "arena.gif"), "pictures"),
+        ("rerun", ("view", ".", "--save", "run.rrd"), "view"),
         ("plotnine", ("analyze", "run"), "analysis"),
     ],
 )
