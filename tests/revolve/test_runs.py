@@ -148,7 +148,7 @@ def test_notebook_gets_births_of_all_islands_and_the_best_sample(
 def test_used_and_missing_folders_raise_the_line_of_the_command(
     done: rv.Run, tmp_path: Path
 ) -> None:
-    with pytest.raises(rv.RunFolderError, match=r"a run; revolve[.]read opens it"):
+    with pytest.raises(rv.RunFolderError, match=r"holds a run.*revolve[.]read opens"):
         rv.run("scenario1", births=15, out=done.folder)
     with pytest.raises(rv.RunFolderError, match="no run in or below this folder"):
         rv.read(tmp_path)
