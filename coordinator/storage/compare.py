@@ -68,7 +68,8 @@ def _of_campaigns(*folders: Path) -> list[str]:
         try:
             differences[name] = compare(*(folder / name for folder in folders))
         except RunFolderError as error:
-            differences[name] = [str(error)]
+            # Another run of the campaign is not meant.
+            differences[name] = [str(error).partition("; did you mean")[0]]
     differing = [name for name, found in differences.items() if found]
     lines = [f"{name}: {line}" for name in differing for line in differences[name]]
     total = counted(len(differences), "run")
