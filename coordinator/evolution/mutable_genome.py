@@ -7,7 +7,7 @@ function call, and convert it into a new genome.
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from itertools import count
-from operator import add, le, sub
+from operator import add
 from typing import NamedTuple, TypeVar
 
 from msgspec import Struct, field
@@ -20,6 +20,9 @@ from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot.ids import BirthId
 
 Gene = TypeVar("Gene", NeuronGene, ConnectionGene)
+
+
+_TUPLES = (tuple, tuple, tuple)
 
 
 class MutableGenome(Struct, eq=False):
@@ -125,6 +128,10 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return the genome of a tree whose branches are given depth first."""
     nodes: list[Node] = []
     for branch in reversed(branches):
+        outputs, hidden, connections = branch.outputs, branch.hidden, branch.connections
+        if (type(outputs), type(hidden), type(connections)) != _TUPLES:
+            outputs, hidden = _as_tuple(outputs), _as_tuple(hidden)
+            connections = _as_tuple(connections)
         # Backwards: children are made before their parent, the last one first.
         children = [(slot, nodes.pop()) for slot in branch.children]
         node = Node(
@@ -133,9 +140,9 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
             branch.orientation,
             branch.parameters,
             branch.gene,
-            _as_tuple(branch.outputs),
-            _as_tuple(branch.hidden),
-            _as_tuple(branch.connections),
+            outputs,
+            hidden,
+            connections,
             tuple(children),
         )
         nodes.append(node)
@@ -226,6 +233,10 @@ def level(branches: Iterable[MutableGenome]) -> None:
         turns[branch] = (before + branch.orientation) % 360
 
 
+Counts = tuple[int, int, int, int]
+"""Plain ``SizeCounts``; a tree has too many subtrees for the names to be free."""
+
+
 class SizeCounts(NamedTuple):
     """Numbers of parts, inputs, outputs and hidden neurons of some branches."""
 
@@ -234,13 +245,15 @@ class SizeCounts(NamedTuple):
     outputs: int
     hidden: int
 
-    def plus(self, other: "SizeCounts") -> "SizeCounts":
+    def plus(self, other: Counts) -> "SizeCounts":
         """Return the sum with other counts."""
         return SizeCounts(*map(add, self, other))
 
-    def minus(self, other: "SizeCounts") -> "SizeCounts":
+    def minus(self, other: Counts) -> "SizeCounts":
         """Return what is left without other counts."""
-        return SizeCounts(*map(sub, self, other))
+        parts, inputs, outputs, hidden = self
+        p, i, o, h = other
+        return SizeCounts(parts - p, inputs - i, outputs - o, hidden - h)
 
 
 def size_limits(space: Space) -> SizeCounts:
@@ -261,20 +274,29 @@ def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
     return SizeCounts(parts, inputs, outputs, hidden)
 
 
-def subtree_sizes(branches: Sequence[MutableGenome]) -> list[SizeCounts]:
+def subtree_sizes(branches: Sequence[MutableGenome]) -> list[Counts]:
     """Return the counts of every subtree of a whole tree, given depth first."""
-    sums: list[SizeCounts] = []
-    of_children: list[SizeCounts] = []
+    sums: list[Counts] = []
+    of_children: list[Counts] = []
     for branch in reversed(branches):
-        counts = size_of([branch])
+        parts, inputs = 1, branch.kind.inputs
+        outputs, hidden = len(branch.outputs), len(branch.hidden)
         for _ in branch.children:
-            counts = counts.plus(of_children.pop())
+            p, i, o, h = of_children.pop()
+            parts, inputs = parts + p, inputs + i
+            outputs, hidden = outputs + o, hidden + h
+        counts = parts, inputs, outputs, hidden
         of_children.append(counts)
         sums.append(counts)
-    return sums[::-1]
+    sums.reverse()
+    return sums
 
 
-def fitting_subtrees(sizes: Sequence[SizeCounts], room: SizeCounts) -> list[int]:
+def fitting_subtrees(sizes: Sequence[Counts], room: SizeCounts) -> list[int]:
     """Return the places of a tree's subtrees, but itself, that fit into ``room``."""
-    every = enumerate(sizes)
-    return [place for place, size in every if place and all(map(le, size, room))]
+    parts, inputs, outputs, hidden = room
+    return [
+        place
+        for place, (p, i, o, h) in enumerate(sizes)
+        if p <= parts and i <= inputs and o <= outputs and h <= hidden and place
+    ]

@@ -51,11 +51,13 @@ def stream(
 ) -> np.random.Generator:
     """Return the stream of one purpose of one attempt at one birth.
 
-    The seed of the run is < 2^64.
+    Its seed sequence is that of ``SeedSequence(seed, spawn_key=(run, island, birth,
+    attempt, purpose))``; the seed of the run is < 2^64.
     """
+    # NumPy makes these 32-bit words of a seed and a key, but slowly, number by number.
     key = (run, birth.island, birth.number, attempt, purpose)
-    sequence = np.random.SeedSequence(seed, spawn_key=key)
-    return np.random.Generator(np.random.PCG64(sequence))
+    words = np.array((seed & 0xFFFFFFFF, seed >> 32, 0, 0, *key), np.uint32)
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
 
 
 class BufferedRng:

@@ -21,8 +21,8 @@ from coordinator.evolution.generation import (
     usable_types,
 )
 from coordinator.evolution.mutable_genome import (
+    Counts,
     MutableGenome,
-    SizeCounts,
     copied,
     fitting_subtrees,
     free_places,
@@ -281,9 +281,10 @@ def vary_parts(
 ) -> None:
     """Move the parameters of every part, except its colour, towards random values."""
     for branch in branches:
-        branch.parameters = draws.nearby(
-            branch.kind.parameters, branch.parameters, epsilon
-        )
+        if branch.kind.own_parameters:
+            branch.parameters = draws.nearby(
+                branch.kind.parameters, branch.parameters, epsilon
+            )
 
 
 def add_parts(
@@ -342,12 +343,12 @@ def expected_parts(branches: Sequence[MutableGenome], experiment: Experiment) ->
     )
 
 
-def deletable(sizes: Sequence[SizeCounts], space: Space) -> list[int]:
+def deletable(sizes: Sequence[Counts], space: Space) -> list[int]:
     """Return the places of the subtrees without which the tree is large enough."""
     most = sizes[0][0] - space.min_parts
     return [place for place, size in enumerate(sizes) if place and size[0] <= most]
 
 
-def duplicable(sizes: Sequence[SizeCounts], space: Space) -> list[int]:
+def duplicable(sizes: Sequence[Counts], space: Space) -> list[int]:
     """Return the places of the subtrees whose second copy stays within all limits."""
     return fitting_subtrees(sizes, size_limits(space).minus(sizes[0]))
