@@ -67,7 +67,8 @@ def restore_best(folder: Path) -> None:
     A process that ends after its run, but before the summary, leaves no file. Errors
     are those of ``conclude``.
     """
-    best = None if (folder / BEST).exists() else best_of(last_populations(folder))
+    last = () if (folder / BEST).exists() else last_populations(folder)
+    best = _best_here(folder, last)
     if best is None:
         return
     try:
@@ -132,7 +133,7 @@ def _results(folder: Path, experiment: Experiment) -> list[str]:
         return [f"extinct after {births}: no robot is left that can have a child"]
     islands = island_experiments(experiment)
     last = last_populations(folder)
-    best = best_of(last)
+    best = _best_here(folder, last)
     if best is None:
         return [f"{births}; no robot of the last population has a fitness"]
     # As analyses compute it: robots of arenas without a fitness do not count.
@@ -180,6 +181,15 @@ def _best_robot(folder: Path, best: Row, experiment: Experiment) -> list[str]:
         f"{line}{lives}, rank in ancestry {rank} (founders: 1), {parts}, {motors}",
         _write_best(robot, folder, experiment),
     ]
+
+
+def _best_here(folder: Path, last: Iterable[Row]) -> Row | None:
+    """Return the best row of a robot whose birth the tables have.
+
+    They lack those of migrants from another group of islands.
+    """
+    here = births_of(folder)
+    return best_of(row for row in last if individual(row).island in here)
 
 
 def _better_ever(folder: Path, best: Row) -> list[str]:
