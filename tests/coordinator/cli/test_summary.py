@@ -177,6 +177,14 @@ OUTCOMES = (
 )
 
 
+def test_the_best_robot_of_a_group_was_born_in_it(tmp_path: Path) -> None:
+    write_tables(tmp_path, {"births": [{"island": 0, "birth": 3}]})
+    here = {"island": 0, "birth_island": None, "birth": 3, "fitness": 0.1}
+    migrant = {"island": 0, "birth_island": 1, "birth": 2, "fitness": 0.3}
+    assert summary._best_here(tmp_path, [migrant, here]) == here
+    assert summary._best_here(tmp_path, [migrant]) is None
+
+
 def test_each_experiment_has_a_row() -> None:
     """0.1, 0.2, 0.3: mean 0.2, variance (0.01 + 0 + 0.01) / 2."""
     assert [*zip(*columns(OUTCOMES).values(), strict=True)] == [
