@@ -262,7 +262,8 @@ class GroupExchange:
     def is_done(self, now_s: float) -> bool:
         """Return whether no other group needs anything of a group that is finished."""
         return not self.unserved and all(
-            partner.is_told or now_s - partner.heard_s > LEAVE_S
+            not partner.is_asked
+            and (partner.is_told or now_s - partner.heard_s > LEAVE_S)
             for partner in self._partners.values()
         )
 
