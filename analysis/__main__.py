@@ -43,7 +43,9 @@ def main(arguments: list[str]) -> int:
         # Before MuJoCo is imported.
         choose_engine()
         from analysis.analyze_command import analyze
-    return analyze(options, arguments, _simulation)
+    from worker.robot.evaluation import evaluate
+
+    return analyze(options, arguments, _simulation, evaluate)
 
 
 def parser(command: str) -> Flags:

@@ -28,6 +28,7 @@ from analysis.measures.distinct_names import with_distinct_names
 from analysis.measures.load import LeftOut, LoadedRun, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import concatenated, measure_runs
+from analysis.measures.winners import Evaluate
 from analysis.progress import bars, replaced
 from analysis.render.picture import Simulate
 from analysis.report.page import report
@@ -45,13 +46,16 @@ _LIBRARIES = (
 
 
 def analyze(
-    options: argparse.Namespace, words: Sequence[str], simulate: Callable[[], Simulate]
+    options: argparse.Namespace,
+    words: Sequence[str],
+    simulate: Callable[[], Simulate],
+    evaluate: Evaluate,
 ) -> int:
     """Measure runs, draw figures, and write the report; return the exit code.
 
     The words of the command line are for the report. ``simulate`` returns the worker's
-    simulation, or raises the reason why robots cannot be rendered. Measures and figures
-    that are left out are no failure.
+    simulation, or raises the reason why robots cannot be rendered; ``evaluate`` is its
+    evaluation. Measures and figures that are left out are no failure.
 
     Raises:
         RunFolderError: no run is found, or the output folder cannot be written.
@@ -69,17 +73,18 @@ def analyze(
     names = in_order(run.experiment for run in runs)
     chosen = chosen_colours(options.colours, names)
     with dressed_in(Look(WIDTHS_IN[options.width], options.style, chosen)):
-        return _write(options, words, simulate, runs, unread)
+        return _write(options, words, (simulate, evaluate), runs, unread)
 
 
 def _write(
     options: argparse.Namespace,
     words: Sequence[str],
-    simulate: Callable[[], Simulate],
+    worker: tuple[Callable[[], Simulate], Evaluate],
     runs: list[LoadedRun],
     unread: Sequence[LeftOut],
 ) -> int:
     """Measure and draw; write all files; return the exit code."""
+    simulate, evaluate = worker
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     for folder in (options.out, options.out / FIGURES):
@@ -90,7 +95,7 @@ def _write(
     with bars(
         f"measuring {counted(len(runs), 'run')}", *columns, TimeRemainingColumn()
     ) as bar:
-        tables, left_out = _measured(runs, benchmark, options, bar)
+        tables, left_out = _measured(runs, benchmark, options, evaluate, bar)
         left_out = [*unread, *not_benchmarks, *left_out]
         # Before the figures: one that fails must not cost the measures.
         _write_measures(tables, left_out, options.out / MEASURES)
@@ -119,11 +124,12 @@ def _measured(
     runs: list[LoadedRun],
     benchmark: pa.Table,
     options: argparse.Namespace,
+    evaluate: Evaluate,
     bar: Progress,
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     slots: SlotRule = "own" if options.slots == "own" else "parent"
     processes = options.processes or cores()
-    measuring = measure_runs(runs, slots=slots, processes=processes)
+    measuring = measure_runs(runs, slots=slots, processes=processes, evaluate=evaluate)
     measured = list(bar.track(measuring, len(runs), description="measuring runs"))
     comparing = bar.add_task("comparing experiments", total=None)
     empty = {name: schema(name).empty_table() for name in _ALWAYS}

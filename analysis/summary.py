@@ -12,6 +12,7 @@ from rich.text import Text
 
 from analysis.measures.fitness_functions import not_compared
 from analysis.measures.populations import last_rows
+from analysis.measures.winners import sustained_shares
 from schema.agent.progress_line import print_line
 from schema.errors import rounded
 
@@ -20,17 +21,21 @@ _BORDERS, _BORDER = 3, 1
 _FOLDED = 12
 """Least width of a folded column of words."""
 
+_HEADS = ("experiment", "run", "births", "judged", "mean of population", "best",
+          "sustained")  # fmt: skip
+
 
 def show(tables: dict[str, pa.Table], console: Console) -> None:
     """Print each run's last populations, the findings, and what was left out.
 
     Nothing is cut off, however narrow the console is.
     """
-    populations = _last_populations(tables["populations"])
+    populations = _last_populations(
+        tables["populations"], sustained_shares(tables["robots"])
+    )
     if populations:
-        heads = ("experiment", "run", "births", "judged", "mean of population", "best")
         print_line(console, "last populations:")
-        _print_table(console, heads, populations, words={0, 1})
+        _print_table(console, _HEADS, populations, words={0, 1})
     else:
         print_line(console, "no population could be measured")
     if findings := _findings(tables["findings"]):
@@ -91,10 +96,13 @@ def _print_table(
     console.print(table)
 
 
-def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
+def _last_populations(
+    populations: pa.Table, sustained: Mapping[tuple[str, int], float]
+) -> list[tuple[str, ...]]:
     """Return name, run, births, judged robots, mean and best of each island's last.
 
-    The island is named beside the run, unless it is island 0 and the only one.
+    What the run's best robot sustains follows on its island. The island is named beside
+    the run, unless it is island 0 and the only one.
     """
     rows = last_rows(populations)
     divided = {row["folder"] for row in rows if row["island"]}
@@ -109,6 +117,9 @@ def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
                 "-" if row[name] is None else rounded(row[name])
                 for name in ("fitness", "fitness_best")
             ),
+            "-"
+            if (share := sustained.get((row["folder"], row["island"]))) is None
+            else f"{100 * share:.0f} %",
         )
         for row in rows
     ]

@@ -17,7 +17,12 @@ from schema.plugins.permission import allow
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
-from worker.robot.robustness import all_changes, rejudge, summary
+from worker.robot.robustness import (
+    rejudge,
+    small_changes,
+    summary,
+    window_changes,
+)
 
 
 def main(arguments: list[str]) -> int:
@@ -66,13 +71,14 @@ def _show_robustness(
         settings = replace(settings, robust=None)
         fitness = _evaluate(robot, settings, trial).fitness
         print(f"{'undisturbed:':26}{rounded(fitness)}")
-    kept: list[float | None] = []
     again = partial(_evaluate, trial=trial)
-    changes = (change for change in all_changes(settings) if change.is_small)
-    for change, changed in rejudge(robot, changes, again):
-        print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)
-        kept.append(changed)
-    print(summary(fitness, kept))
+    found: list[list[float | None]] = []
+    for changes in (small_changes(settings), window_changes(settings)):
+        found.append([])
+        for change, changed in rejudge(robot, changes, again):
+            print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)
+            found[-1].append(changed)
+    print(summary(fitness, *found))
 
 
 def _share(found: float | None, fitness: float) -> str:
@@ -131,8 +137,9 @@ def parser(_command: str = "robot simulate") -> Flags:
     flags.add_argument(
         "--robustness",
         action="store_true",
-        help="evaluate it again with finer time steps, 1 %% less friction and starts "
-        "raised by about 0.1 mm, and show how much of its fitness it keeps",
+        help="evaluate it again with finer time steps, 1 %% less friction, starts "
+        "raised by about 0.1 mm, and in the next four windows, and show how much of "
+        "its fitness it keeps",
     )
     what = "number of the evaluation, from 0: each has noise, pushes and disturbances "
     add_count(flags, "--trial", 0, f"{what}of its own", least=0, most=MOST_TRIAL)

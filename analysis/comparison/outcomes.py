@@ -12,6 +12,7 @@ from analysis.measures.load import island_settings
 from analysis.measures.outputs import OWN, POPULATION, schema
 from analysis.measures.population_table import Numbers, ratio
 from analysis.measures.populations import RETENTION_BIRTHS
+from analysis.measures.winners import LATER
 from schema.experiment.document import Experiment
 
 
@@ -162,10 +163,10 @@ def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, floa
 def _of_lives(
     tables: Mapping[str, pa.Table], births: int, going_on: Sequence[int]
 ) -> dict[str, float]:
-    """Return outcomes of families, contacts and variability of the other islands."""
-    families, contacts, lives = (
+    """Return outcomes of lives and of the best robot, of islands that have ended."""
+    families, contacts, lives, robots = (
         _table(tables, name, going_on)
-        for name in ("families", "interactions", "variability")
+        for name in ("families", "interactions", "variability", "robots")
     )
     distances = (_column(families, name) for name in ("distance", "founder_distance"))
     ranges = _column(lives.filter(pc.field("birth") < births), "variability")
@@ -175,6 +176,7 @@ def _of_lives(
     return {
         "family_distance": _mean(ratio(*distances)),
         "family_founders": _mean(_column(families, "founders")),
+        **{name: _mean(_column(robots, name)) for name in LATER},
         "variability": float(np.median(ranges)) if len(ranges) else math.nan,
         "between": float(between[-1]) if len(between) else math.nan,
         "real_time_factor": math.nan,

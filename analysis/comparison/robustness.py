@@ -12,6 +12,8 @@ from typing import Any
 import pyarrow as pa
 
 from schema.errors import rounded
+from schema.experiment.settings import LATER_WINDOW
+from schema.robot.results import sustained
 
 Row = dict[str, Any]
 
@@ -69,13 +71,24 @@ def kept(rows: Sequence[Row]) -> float | None:
     """Return the share of its fitness that one robot keeps; None if there is none.
 
     The mean over groups of the mean over the changes of a group, so that groups of many
-    changes count no more than others. Failed evaluations are left out.
+    changes count no more than others. Failed evaluations and later windows are left
+    out.
     """
     groups: dict[str, list[float]] = {}
-    for row in rows:
+    for row in _disturbed(rows):
         if row["share"] is not None:
             groups.setdefault(row["group"], []).append(row["share"])
     return fmean(map(fmean, groups.values())) if groups else None
+
+
+def _disturbed(rows: Sequence[Row]) -> list[Row]:
+    return [row for row in rows if row["group"] != LATER_WINDOW]
+
+
+def lasting_share(rows: Sequence[Row]) -> float | None:
+    """Return the share of its fitness that one robot sustains in later windows."""
+    later = [row["fitness"] for row in rows if row["group"] == LATER_WINDOW]
+    return sustained(rows[0]["undisturbed"], later) if later else None
 
 
 def summary(table: pa.Table) -> str:
@@ -117,22 +130,35 @@ def _of_last(robots: Sequence[Sequence[Row]]) -> str:
     shares = [share for rows in robots if (share := kept(rows)) is not None]
     if not shares:
         return ""
-    return (
+    lasting = [share for rows in robots if (share := lasting_share(rows)) is not None]
+    text = (
         f"the last population of {len(robots)} keeps {percent(median(shares))} in "
         f"the median, {percent(min(shares))} to {percent(max(shares))}"
     )
+    if lasting:
+        text += f", and sustains {percent(median(lasting))} in later windows"
+    return text
 
 
 def _of_best(name: str, rows: Sequence[Row]) -> str:
     share, fitness = kept(rows), rounded(rows[0]["undisturbed"])
     if share is None:
         return f"{name}, has a fitness of {fitness} without changes"
-    known = sorted((r["share"], r["change"]) for r in rows if r["share"] is not None)
+    known = sorted(
+        (row["share"], row["change"])
+        for row in _disturbed(rows)
+        if row["share"] is not None
+    )
     (low, worst), (high, gain) = known[0], known[-1]
     return (
         f"{name}, keeps {percent(share)} of its fitness ({fitness}) on average, from "
-        f"{percent(low)} under {worst} to {percent(high)} under {gain}"
+        f"{percent(low)} under {worst} to {percent(high)} under {gain}{_lasting(rows)}"
     )
+
+
+def _lasting(rows: Sequence[Row]) -> str:
+    share = lasting_share(rows)
+    return "" if share is None else f", and sustains {percent(share)} in later windows"
 
 
 def percent(share: float) -> str:

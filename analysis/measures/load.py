@@ -24,8 +24,8 @@ from schema.tables.columns import TABLES, VERSION
 from schema.tables.description import (
     DETAILS,
     STATE,
-    groups_of,
     check_folder,
+    groups_of,
     read_description,
     read_state,
 )

@@ -40,6 +40,7 @@ from analysis.measures.population_table import (
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import Problems, RunTables
 from analysis.measures.season_changes import season_changes
+from analysis.measures.winners import LATER
 from schema.errors import RevolveError
 from schema.experiment.document import Experiment
 from schema.robot.trees import Integers
@@ -65,6 +66,7 @@ def robots(run: RunTables) -> pa.Table:
             "fitness_max": greatest[chosen],
             "births": births_so_far(run.births)[chosen],
             "is_failed": is_failed[chosen],
+            **dict.fromkeys(LATER, pa.nulls(len(chosen), pa.float64())),
         }
     )
 

@@ -101,6 +101,9 @@ OUTCOME = {
     "parts_fitness": "rank correlation of fitness and parts, all robots",
     "family_distance": "distance within the best robot's family / among founders",
     "family_founders": "number of founders whose parts are in that family",
+    "later_fitness": "mean fitness of the best robot of the last population, alone, in "
+    "the four windows after that of its evaluation",
+    "sustained": "later_fitness divided by the fitness in the window of its evaluation",
     "touching": "contact time of robots divided by their lifetimes; simultaneous "
     "contacts count separately (on-line)",
     "real_time_factor": "simulated by wall-clock time of 30 robots (bench arena)",
@@ -169,6 +172,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "the highest number is born first",
         "is_failed": "whether all its evaluations failed, which counts as 0, or as "
         "the least fitness below 0",
+        "later_fitness": "of the fittest robot of the last populations, simulated "
+        "alone: mean fitness in the four windows after that of its evaluation; null of "
+        "others",
+        "sustained": "later_fitness divided by the fitness in the window of its "
+        "evaluation, also alone; null if that is not positive",
     },
     "extremities": {
         **_RUN,

@@ -23,6 +23,9 @@ from analysis.measures.measures import measure
 from analysis.measures.named_measures import with_docstrings
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
+from analysis.measures.winners import Evaluate, with_later_windows
+from schema.errors import RevolveError
+from schema.plugins.permission import allow, allowed
 from schema.tables.description import run_columns
 
 
@@ -36,21 +39,28 @@ class MeasuredRun:
 
 
 def measure_runs(
-    runs: Sequence[LoadedRun], *, slots: SlotRule = "parent", processes: int = 1
+    runs: Sequence[LoadedRun],
+    *,
+    slots: SlotRule = "parent",
+    processes: int = 1,
+    evaluate: Evaluate | None = None,
 ) -> Iterator[MeasuredRun]:
     """Yield the measures of runs, in their order.
 
-    They are measured in other processes, also one run: the memory of tables, of Numba
-    and of what it compiles is free when figures are drawn.
+    With ``evaluate``, the best robot of each finished run is evaluated in later
+    windows. Runs are measured in other processes, also one run: the memory of tables,
+    of Numba and of what it compiles is free when figures are drawn.
     """
     try:
-        pool = ProcessPoolExecutor(min(processes, len(runs)), get_context("spawn"))
+        pool = ProcessPoolExecutor(
+            min(processes, len(runs)), get_context("spawn"), allow, (allowed(),)
+        )
     except OSError:  # This system has no semaphores.
-        yield from map(measure_run, runs, repeat(slots))
+        yield from map(measure_run, runs, repeat(slots), repeat(evaluate))
         return
     with pool:
         try:
-            yield from pool.map(measure_run, runs, repeat(slots))
+            yield from pool.map(measure_run, runs, repeat(slots), repeat(evaluate))
         except BaseException:
             # Not to wait for the runs that are being measured.
             for child in active_children():
@@ -59,7 +69,9 @@ def measure_runs(
             raise
 
 
-def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
+def measure_run(
+    run: LoadedRun, slots: SlotRule, evaluate: Evaluate | None = None
+) -> MeasuredRun:
     """Return the measures of one run, and what was left out."""
     tables, left_out = read_tables(run)
     folder = str(run.folder)
@@ -83,6 +95,12 @@ def measure_run(run: LoadedRun, slots: SlotRule) -> MeasuredRun:
     if "named_measures" in measures:
         named_measures = with_docstrings(measures["named_measures"], run)
         measures["named_measures"] = named_measures
+    if evaluate is not None and run.is_finished and "robots" in measures:
+        try:
+            robots = with_later_windows(measures["robots"], run, tables, evaluate)
+            measures["robots"] = robots
+        except RevolveError as error:
+            left_out.append(LeftOut(folder, "measures of later windows", str(error)))
     named = {name: _named(rows, name, run) for name, rows in measures.items()}
     named["runs"] = _named(_summary(run, tables, unread), "runs", run)
     if run.point:

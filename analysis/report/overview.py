@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
-from statistics import mean
+from statistics import mean, median
 
 import pyarrow as pa
 
@@ -10,6 +10,7 @@ from analysis.figures.forms import Row, Tables
 from analysis.figures.style import colours, in_order, label
 from analysis.measures.fitness_functions import axis_text, functions_of
 from analysis.measures.populations import last_rows
+from analysis.measures.winners import sustained_shares
 from analysis.report.fitness import run_names
 from analysis.report.html import cell, duration, folded, named, table
 from schema.errors import counted
@@ -24,12 +25,14 @@ def summary(tables: Tables) -> str:
     """Return one row per experiment: runs, births, fitness, time, failures."""
     runs = tables["runs"].to_pylist()
     fitness = _last_fitness(tables["populations"])
+    sustained = sustained_shares(tables["robots"])
     names = in_order(row["experiment"] for row in runs)
     paint = colours(names)
     functions = functions_of(tables["runs"])
     has_functions = len(set(functions.values())) > 1
     heads = ["experiment", *(["fitness function"] if has_functions else []), "runs",
-             "births of a run", "best fitness", "mean of bests", "mean of populations",
+             "births of a run", "best fitness", "sustained", "mean of bests",
+             "mean of populations",
              "time of a run", "failures"]  # fmt: skip
     rows = []
     for name in names:
@@ -46,6 +49,15 @@ def summary(tables: Tables) -> str:
                 str(births[0]) if len(births) == 1 else f"{births[0]} to {births[-1]}"
             ),
             cell(max((best for best, _ in known), default=None)),
+            cell(
+                _percent(
+                    [
+                        share
+                        for (folder, _), share in sustained.items()
+                        if folder in {row["folder"] for row in mine}
+                    ]
+                )
+            ),
             *(
                 cell(mean(pair[at] for pair in known) if known else None)
                 for at in range(2)
@@ -63,6 +75,10 @@ def summary(tables: Tables) -> str:
             set(functions.values()), has_islands=any(row["islands"] > 1 for row in runs)
         )
     )
+
+
+def _percent(shares: Sequence[float]) -> str | None:
+    return f"{100 * median(shares):.0f} %" if shares else None
 
 
 def _differing(differs: Mapping[str, str]) -> str:
@@ -93,7 +109,9 @@ def _summary_note(functions: Collection[str], *, has_islands: bool) -> str:
     text = (
         "Fitness of the last populations: the best robot of all runs, the mean over "
         "runs of each run's best robot, and the mean over runs of the mean of each "
-        "run's population. "
+        "run's population. Sustained is what the best robot of a run keeps of its "
+        "fitness in the four windows after that of its evaluation, simulated alone; "
+        "the median over runs. "
     )
     if has_islands:
         text += "A run of several islands counts with the mean of their means. "

@@ -19,6 +19,7 @@ from analysis.figures.robot_figures import GAITS, PART_COLOURS
 from analysis.figures.style import in_order, label
 from analysis.measures.fitness_functions import axis_text
 from analysis.measures.outputs import OUTPUTS
+from analysis.measures.winners import sustained_shares
 from analysis.report.differences import all_differences, differences
 from analysis.report.fitness import (
     fitness_over_births,
@@ -212,8 +213,14 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     names = run_names(tables["runs"])
     arenas = tables["runs"].filter(pc.field("simulated_s").is_valid())
     folders = frozenset(arenas["folder"].to_pylist())
+    shares = sustained_shares(tables["robots"])
     shown = "".join(
-        _film(one, str(names[folder]), has_arena=folder in folders)
+        _film(
+            one,
+            str(names[folder]),
+            shares.get((folder, one.best.island)),
+            has_arena=folder in folders,
+        )
         for one in drawings.films
         if (folder := str(one.best.folder))
     )
@@ -229,18 +236,19 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
-def _film(one: Film, run: str, *, has_arena: bool) -> str:
+def _film(one: Film, run: str, share: float | None, *, has_arena: bool) -> str:
     best = one.best
     data = base64.b64encode(one.path.read_bytes()).decode()
     name = f"Robot {best.birth_island}:{best.birth} of {best.folder.name} ({run})"
     if best.island != best.birth_island:
         name += f" on island {best.island}"
+    lasting = "" if share is None else f", {100 * share:.0f} % of it in later windows"
     others = " Among the robots of an arena it may move differently." * has_arena
     return (
         f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'
         f"<figcaption><b>{escape(label(best.experiment))}: fitness "
-        f"{number(best.fitness)}.</b> {escape(name)}, simulated alone, from the "
-        f"middle of its evaluation on.{others} "
+        f"{number(best.fitness)}{lasting}.</b> {escape(name)}, simulated alone, "
+        f"from the middle of its evaluation on.{others} "
         f"File: <code>figures/{escape(one.path.name)}</code>; "
         f'<a href="figures/{escape(one.path.stem)}.html">look from all sides</a>.'
         "</figcaption></figure>"

@@ -1,4 +1,4 @@
-"""Films of arenas, drawn from the poses of a run, with the robots that live together."""
+"""Films of arenas, drawn from the poses of a run: robots that live together."""
 
 import argparse
 from collections.abc import Mapping, Sequence

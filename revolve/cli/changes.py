@@ -26,33 +26,27 @@ from analysis.progress import bars, replaced
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
 from revolve.evaluation import Result
-from revolve.experiment import Experiment, document_of
+from revolve.experiment import document_of
 from revolve.fleet import Fleet
 from revolve.robot import Robot, plain
 from revolve.runs import Run as OwnRun
 from schema.errors import RunFolderError, counted
-from schema.experiment.changes import settings_at
 from schema.experiment.document import (
     REVOLVE_ANGLE,
     body_space,
-    island_experiment,
-    light_of,
-    steps_of,
 )
 from schema.experiment.document import Experiment as Document
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
     EvaluationSettings,
     evaluation_settings_of,
-    lasting,
 )
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot as PlainRobot
 from schema.tables.description import check_folder, make_folder
 from schema.tables.files import born_as
 from schema.tables.last_populations import best_ever, fittest_first
-from schema.tables.learnt import best_trials
-from schema.wire.born import birth_point
+from schema.wire.recorded import last_recorded, repeatable
 from schema.wire.updates import individual
 from worker.filters.channels import all_ablations
 from worker.robot.robustness import all_changes
@@ -110,13 +104,14 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     ever = individual(next(best_ever(folder), first))
     own = OwnRun(folder)
     births = tables["births"]
-    recorded = _recorded(tables)
+    recorded = last_recorded(tables["evaluations"], tables["learning"])
     chosen: list[Chosen] = []
     for number, row in enumerate(table.to_pylist()):
         name = BirthId(row["birth_island"], row["birth"])
         if not (number in last or name == ever):
             continue
-        (robot,) = own.robots(births.filter(born_as(name)))
+        birth = births.filter(born_as(name))
+        (robot,) = own.robots(birth)
         head = {
             "experiment": run.experiment,
             "folder": str(folder),
@@ -128,17 +123,12 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
         }
         there = row["island"]
         origin = Origin(seed=run.seed, run=run.number, island=there)
-        trial, simulated_s, point = recorded.get((there, name), (0, None, None))
-        identity = Identity(origin, name, trial)
-        changing = _alone(own.experiment, there)
-        if point is None:
-            (born,) = births.filter(born_as(name)).to_pylist()
-            point = birth_point(born)
-        document = settings_at(changing, point)
-        settings = evaluation_settings_of(document)
-        if simulated_s is not None:
-            steps = steps_of(simulated_s, settings.simulation)
-            settings = lasting(settings, steps)
+        changing, document, settings, identity = repeatable(
+            document_of(own.experiment),
+            origin,
+            birth.to_pylist()[0],
+            recorded.get((there, name)),
+        )
         seasons = _seasons(changing, settings)
         chosen.append(Chosen(head, document, settings, robot, identity, seasons))
     return chosen
@@ -159,45 +149,11 @@ def _seasons(
     return seasons
 
 
-def _recorded(
-    tables: dict[str, pa.Table],
-) -> dict[tuple[int, BirthId], tuple[int, float | None, float | None]]:
-    """Return trial, time [s] and point of each robot's last evaluation on each island.
-
-    Of a robot that has learnt there it is the first of its best trials.
-    """
-    learnt = best_trials(tables["learning"])
-    recorded: dict[tuple[int, BirthId], tuple[int, float | None, float | None]] = {}
-    for row in tables["evaluations"].to_pylist():
-        island, birth = row["island"], individual(row)
-        own = learnt.get(birth, 0) if island == birth.island else 0
-        trial = row["trial"] or own
-        recorded[island, birth] = (trial, row["simulated_s"], row["point"])
-    return recorded
-
-
 def _fittest_first(table: pa.Table) -> list[int]:
     """Return the rows of robots by descending fitness, failed robots last."""
     rows = table.to_pylist()
     keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
     return sorted(range(len(rows)), key=keys.__getitem__)
-
-
-def _alone(experiment: Experiment, island: int) -> Document:
-    """Return the settings of one island for an evaluation alone, off-line.
-
-    Robots of an arena start as at their birth, alone and without walls.
-    """
-    own = island_experiment(document_of(experiment), island)
-    if own.arena is not None:
-        light = light_of(own.environment, own.arena)
-        own = structs.replace(
-            own,
-            simulation=structs.replace(own.simulation, drop_m=own.arena.drop_m),
-            environment=structs.replace(own.environment, light=light),
-            arena=None,
-        )
-    return own
 
 
 Row = dict[str, Any]

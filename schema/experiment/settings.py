@@ -276,6 +276,28 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
     return replace(settings, simulation=replace(clock, warmup_steps=warmup))
 
 
+LATER_WINDOW = "later window"
+"""Group of the changes that evaluate a robot in a later window."""
+LATER_WINDOWS = 4
+"""Windows after an evaluation in which its robot is evaluated again."""
+
+
+def later_windows(settings: EvaluationSettings) -> tuple[EvaluationSettings, ...]:
+    """Return settings of evaluations whose windows follow one after the other.
+
+    The first follows the window of the evaluation, without ``[robust]``. In each the
+    robot starts as before, and what precedes the window is warm-up.
+    """
+    clock = settings.simulation
+    return tuple(
+        lasting(
+            replace(settings, robust=None),
+            clock.evaluation_steps + number * clock.window_steps,
+        )
+        for number in range(1, LATER_WINDOWS + 1)
+    )
+
+
 @lru_cache(maxsize=64)
 def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the fitness function that an experiment names.

@@ -1,6 +1,7 @@
 """Results of vetting and evaluating a robot."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from statistics import fmean
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -54,6 +55,29 @@ class Provenance(Struct, frozen=True, forbid_unknown_fields=True):
 def failed_fitness(others: Iterable[float]) -> float:
     """Return what a failed evaluation counts as: 0, or the least of others below 0."""
     return min((0.0, *others))
+
+
+def later_fitness(later: Sequence[float | None]) -> float:
+    """Return the mean fitness in later windows; None is a failed evaluation's."""
+    failed = failed_fitness(each for each in later if each is not None)
+    return fmean(failed if each is None else each for each in later)
+
+
+def sustained(selected: float | None, later: Sequence[float | None]) -> float | None:
+    """Return the share of its fitness that a robot has in later windows.
+
+    Args:
+        selected: fitness in the window of the evaluation; None if that failed.
+        later: fitness in each window after it, as of ``later_fitness``.
+
+    Returns:
+        Mean of the later windows over ``selected``; None if that is not positive.
+
+    Source: own definition.
+    """
+    if selected is None or selected <= 0:
+        return None
+    return later_fitness(later) / selected
 
 
 class Report(Struct, frozen=True, forbid_unknown_fields=True, tag="report"):

@@ -46,7 +46,9 @@ def tables() -> dict[str, pa.Table]:
             {"experiment": run["experiment"], "folder": run["folder"],
              "birth_island": 0, "birth": birth, "fitness": fitness,
              "fitness_max": fitness, "births": birth + 1, "is_failed": False,
-             "is_last": birth > 0, "parts": 9, "active_joints": 3, "hidden": 2}
+             "is_last": birth > 0, "island": 0,
+             "sustained": 0.25 if run["run"] and birth == 2 else None,
+             "parts": 9, "active_joints": 3, "hidden": 2}
             for run in RUNS
             for birth, fitness in enumerate((0.2, 0.1, 0.3))
         ],

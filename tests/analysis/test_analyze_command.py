@@ -20,6 +20,7 @@ from schema.errors import RevolveError
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path
 from tests.analysis.campaign import random_bodies, write_run
+from worker.robot.evaluation import evaluate
 
 
 def no_pictures() -> NoReturn:
@@ -37,7 +38,7 @@ def test_an_analysis_without_figures_says_so(
     options = parser("analyze").parse_args(
         [str(tmp_path / "run"), "--out", str(out), "--processes", "1"]
     )
-    assert analyze(options, ["analyze", "run"], no_pictures) == 0
+    assert analyze(options, ["analyze", "run"], no_pictures, evaluate) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "no population could be measured"
     text = "no figure could be drawn; see the line 'left out: figures'"
@@ -45,7 +46,7 @@ def test_an_analysis_without_figures_says_so(
     (line,) = [line for line in lines if line.startswith("left out: figures ")]
     assert "; 6.2, " in line
     assert line.count("no finished run could be measured") == 1
-    analyze(options, ["analyze", "run"], no_pictures)
+    analyze(options, ["analyze", "run"], no_pictures, evaluate)
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith(f"{out / 'report.html'}: replaces the report of ")
 
@@ -65,7 +66,7 @@ def test_names_that_do_not_exist_are_refused_before_anything_is_written(
     write_run(tmp_path / "run", "scenario1", 0, 30, bodies)
     words = [str(tmp_path / "run"), "--out", str(tmp_path / "report"), *flags]
     with pytest.raises(RevolveError, match=text):
-        analyze(parser("analyze").parse_args(words), words, no_pictures)
+        analyze(parser("analyze").parse_args(words), words, no_pictures, evaluate)
     assert not (tmp_path / "report").exists()
 
 
@@ -79,7 +80,7 @@ def test_only_the_figures_asked_for_are_drawn(tmp_path: Path) -> None:
     kept.touch()
     words = [str(tmp_path / "run"), "--out", str(out), "--processes", "1"]
     words += ["--figures", "6.3,6.14a", "--format", "svg", "--style", "dark"]
-    analyze(parser("analyze").parse_args(words), words, no_pictures)
+    analyze(parser("analyze").parse_args(words), words, no_pictures, evaluate)
     assert sorted((out / "figures").iterdir()) == [
         out / "figures" / "6.14a-fitness-by-the-number-of-extremities.svg",
         out / "figures" / "6.14a-fitness-by-the-number-of-extremities.txt",
@@ -100,6 +101,8 @@ ROWS: dict[str, list[dict[str, Any]]] = {
          "births": births, "judged": 15, "fitness": 0.1234, "fitness_best": 0.5678}
         for births in (30, 1500)
     ],
+    "robots": [{"experiment": NAME, "folder": f"runs/{NAME}-12", "island": 3,
+                "sustained": 0.3456}],
     "findings": [
         {"figure": "6.14", "claim": f"{NAME}: more [bold] extremities", "runs_a": 2,
          "mean_a": -0.369, "mean_b": 0.5, "q": 0.701, "verdict": "not reproduced"},
@@ -122,7 +125,17 @@ def output(rows: dict[str, list[dict[str, Any]]], width: int) -> str:
 def test_nothing_is_cut_off_on_a_narrow_console(width: int) -> None:
     text = output(ROWS, width)
     assert "…" not in text
-    for number in ("1500", "15", "0.1234", "0.5678", "6.14", "-0.369", "0.5", "0.701"):
+    for number in (
+        "1500",
+        "15",
+        "0.1234",
+        "0.5678",
+        "35",
+        "6.14",
+        "-0.369",
+        "0.5",
+        "0.701",
+    ):
         assert number in text.replace("│", " ").replace(",", " ").split()
     words = "".join(text.replace("│", " ").split())
     for cell in ("[bold]", "reproduced", "instead", "[red]"):
@@ -130,7 +143,7 @@ def test_nothing_is_cut_off_on_a_narrow_console(width: int) -> None:
 
 
 def test_folded_names_are_complete() -> None:
-    lines = output({"populations": ROWS["populations"]}, 80).splitlines()
+    lines = output({"populations": ROWS["populations"]}, 92).splitlines()
     cells = [line.split("│")[1:3] for line in lines if line.startswith("│")]
     assert "".join(name.strip() for name, _ in cells) == NAME
     assert "".join(run.strip() for _, run in cells).replace(" ", "") == f"{NAME}-123"

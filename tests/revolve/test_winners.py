@@ -2,9 +2,10 @@
 
 import pyarrow as pa
 
-from revolve.cli.changes import _fittest_first, _recorded
+from revolve.cli.changes import _fittest_first
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
+from schema.wire.recorded import last_recorded
 
 WANDERER, SETTLER = BirthId(0, 1), BirthId(0, 2)
 
@@ -41,7 +42,7 @@ def test_last_evaluation_on_an_island_is_repeated() -> None:
     trials = rows("learning", (0, 1, 0), (0, 1, 3), (0, 2, 0), (0, 2, 4))
     fitness = pa.array([0.5, 1.5, 0.5, 1.5])
     trials = trials.append_column("fitness", fitness)
-    found = _recorded({"evaluations": evaluations, "learning": trials})
+    found = last_recorded(evaluations, trials)
     assert {key: (trial, point) for key, (trial, _, point) in found.items()} == {
         (0, WANDERER): (2, 9),
         (0, SETTLER): (4, None),

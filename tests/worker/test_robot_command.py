@@ -105,11 +105,16 @@ def test_robustness_is_shown_by_change_and_in_one_line(simulated: Simulate) -> N
     plain = simulated(short).out.splitlines()
     lines = simulated(short, "--robustness").out.splitlines()
     assert lines[:4] == plain
-    assert len(lines) == 4 + 11 + 1
+    assert len(lines) == 4 + 11 + 4 + 1
+    assert lines[-2].startswith("window 8 to 10 s:")
     assert lines[4].startswith("time step 0.0025 s:")
     shares = [int(line.split("(")[1].split()[0]) for line in lines[4:-1]]
-    text = f"keeps {min(shares)} to {max(shares)} % of its fitness"
+    small, later = shares[:11], shares[11:]
+    text = f"keeps {min(small)} to {max(small)} % of its fitness"
     assert lines[-1].startswith(text)
+    share = re.search(r"; sustains (\d+) % in the next 4 windows$", lines[-1])
+    assert share
+    assert int(share[1]) == pytest.approx(sum(later) / 4, abs=1)
 
 
 def test_a_long_simulation_shows_its_progress(

@@ -14,8 +14,12 @@ from msgspec.structs import replace
 from schema.errors import FAILURES
 from schema.experiment.document import Simulation
 from schema.experiment.robust import Robust
-from schema.experiment.settings import EvaluationSettings
-from schema.robot.results import Evaluation
+from schema.experiment.settings import (
+    LATER_WINDOW,
+    EvaluationSettings,
+    later_windows,
+)
+from schema.robot.results import Evaluation, sustained
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
 
@@ -62,12 +66,37 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
     )
 
 
+def small_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
+    """Return settings with finer time steps, less friction, and raised starts.
+
+    The settings have no ``robust``.
+
+    Source: own definition.
+    """
+    return tuple(change for change in all_changes(settings) if change.is_small)
+
+
+def window_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
+    """Return settings of the windows after that of the evaluation, named by time."""
+    changed = []
+    for later in later_windows(settings):
+        clock = later.simulation
+        start, end = (
+            steps * clock.timestep_s
+            for steps in (clock.warmup_steps, clock.evaluation_steps)
+        )
+        name = f"window {start:g} to {end:g} s"
+        changed.append(ChangedSettings(name, later, LATER_WINDOW))
+    return tuple(changed)
+
+
 def all_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """Return settings with another time step, friction, start, noise, ground and robot.
 
-    Time steps are finer. Friction, masses and torques differ by up to 10 %. Starts are
-    raised or tilted. Sensors or motors have noise; the mean of several evaluations
-    counts. A plane becomes rough or steeper; rough ground gets other bumps.
+    The first ones have later windows. Time steps are finer. Friction, masses and
+    torques differ by up to 10 %. Starts are raised or tilted. Sensors or motors have
+    noise; the mean of several evaluations counts. A plane becomes rough or steeper;
+    rough ground gets other bumps.
 
     The settings have no ``robust``.
 
@@ -75,8 +104,11 @@ def all_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """
     ground = settings.environment
     changed = [
-        ChangedSettings(name, replace(settings, simulation=world), group, is_small)
-        for name, group, world, is_small in _simulations(settings.simulation)
+        *window_changes(settings),
+        *(
+            ChangedSettings(name, replace(settings, simulation=world), group, is_small)
+            for name, group, world, is_small in _simulations(settings.simulation)
+        ),
     ]
     for key, level in NOISES.items():
         noise = replace(_NO_DISTURBANCE, **{key: (level, level)})
@@ -151,8 +183,21 @@ def rejudge(
             yield change, None
 
 
-def summary(fitness: float, found: Sequence[float | None]) -> str:
-    """Return one line that says how much of its fitness a robot keeps."""
+def summary(
+    fitness: float, found: Sequence[float | None], later: Sequence[float | None]
+) -> str:
+    """Return one line that says how much of its fitness a robot keeps.
+
+    ``found`` under small changes, ``later`` in the later windows.
+    """
+    share = sustained(fitness, later)
+    line = _kept_line(fitness, found)
+    if share is None:
+        return line
+    return f"{line}; sustains {100 * share:.0f} % in the next {len(later)} windows"
+
+
+def _kept_line(fitness: float, found: Sequence[float | None]) -> str:
     known = [each for each in found if each is not None]
     under = f"under {len(found)} small changes of time step, friction and start"
     if not known:

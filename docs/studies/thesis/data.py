@@ -16,7 +16,9 @@ import pyarrow.parquet as pq
 from analysis.comparison.comparison import Outcomes, RunOutcomes
 from analysis.comparison.outcomes import of_courses
 from analysis.measures.outputs import BODY, schema
-from docs.studies.pages import DOCS
+from analysis.measures.winners import LATER
+from docs.studies.pages import DOCS, csv_rows
+from schema.robot.results import later_fitness, sustained
 
 DATA = DOCS / "data"
 BENCHMARKS = ("arena", "spider")
@@ -78,11 +80,18 @@ NAMES = [("experiment", pa.string()), ("run", pa.int32())]
 
 COURSES = ("late_rise", "early_diversity")
 """Outcomes that are not in the files: computed from the kept ``populations``."""
+WINDOWS = Path("windows") / "robots.csv"
+"""Fitness of best robots in five windows, which outcomes of later windows follow from:
+all start as in scenario 1."""
+SELECTED = "window 0 to 12 s"
+LATER_COLUMNS = tuple(
+    f"window {start} to {start + 12} s" for start in range(12, 60, 12)
+)
 
 
 def _of_analysis(table: str) -> pa.Schema:
     """Return the columns of ``revolve analyze``, but the repeat for the folder."""
-    names = {"experiment", "folder", *COURSES}
+    names = {"experiment", "folder", *COURSES, *LATER}
     fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
     return pa.schema([*NAMES, *fields])
 
@@ -225,7 +234,9 @@ def kept(data: Path, table: str) -> pa.Table:
         rows = read_rows(data, table, name)
         pieces.append(rows.append_column("folder", pa.repeat(name, rows.num_rows)))
     found = pa.concat_tables(pieces)
-    return _with_courses(found, data) if table == "outcomes" else found
+    if table != "outcomes":
+        return found
+    return _with_later_windows(_with_courses(found, data), data)
 
 
 def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
@@ -245,6 +256,42 @@ def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
     for name in COURSES:
         column = pa.array([one[name] for one in found], pa.float64(), from_pandas=True)
         outcomes = outcomes.append_column(name, column)
+    return outcomes
+
+
+def windows(data: Path, experiment: str) -> list[list[float | None]]:
+    """Return the fitness of an experiment's best robots in five windows, by repeat."""
+    return [
+        each for (name, _), each in sorted(_windows(data).items()) if name == experiment
+    ]
+
+
+def _windows(data: Path) -> dict[tuple[str, int], list[float | None]]:
+    return {
+        (row["experiment"], int(row["run"])): [
+            float(row[key]) if row[key] else None for key in (SELECTED, *LATER_COLUMNS)
+        ]
+        for row in csv_rows(data / WINDOWS)
+    }
+
+
+def _with_later_windows(outcomes: pa.Table, data: Path) -> pa.Table:
+    """Return the rows of ``outcomes`` with those of ``LATER``, at the end of runs."""
+    every = _windows(data)
+    ends: dict[tuple[str, int], int] = {}
+    rows = outcomes.select(["experiment", "run", "births"]).to_pylist()
+    for row in rows:
+        key = row["experiment"], row["run"]
+        ends[key] = max(row["births"], ends.get(key, 0))
+    found: dict[str, list[float | None]] = {name: [] for name in LATER}
+    for row in rows:
+        key = row["experiment"], row["run"]
+        is_known = key in every and row["births"] == ends[key]
+        first, *later = every[key] if is_known else [None]
+        found["later_fitness"].append(later_fitness(later) if later else None)
+        found["sustained"].append(sustained(first, later) if later else None)
+    for name, values in found.items():
+        outcomes = outcomes.append_column(name, pa.array(values, pa.float64()))
     return outcomes
 
 

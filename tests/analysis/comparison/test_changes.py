@@ -169,6 +169,19 @@ def test_line_about_a_run() -> None:
     )
 
 
+def test_later_windows_are_told_apart_from_changes() -> None:
+    late = [changed(birth, "later window", fitness, 0.1)
+            for birth, each in ((7, (0.04, 0.02)), (8, (0.1, None)), (9, (0.07, 0.07)))
+            for fitness in each]  # fmt: skip
+    table = table_of([*ROWS[:6], *late], robustness.COLUMNS)
+    rows = table.to_pylist()
+    assert kept([*rows[:3], *rows[6:8]]) == pytest.approx(0.6)
+    line = robustness.summary(table)
+    assert "to 100 % under start changed, and sustains 30 % in later windows; " in line
+    # Of the shares 30, 100 (of 0.05 without changes) and 70 %.
+    assert "60 % to 110 %, and sustains 70 % in later windows; 2 of 12" in line
+
+
 def test_figure_has_a_point_for_each_share() -> None:
     rows = [*ROWS, changed(7, "start", 0.09, change="start 0.1 mm higher")]
     last, best = (

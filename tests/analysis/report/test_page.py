@@ -124,8 +124,8 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
     [
         # Means of the last populations are 0.1, 0.2 and 0.3, the best 0, 0.5 and 1.
         "3 runs, 165 births; written 2020-01-01",
-        "soft 2 finished 60 0.5 0.25 0.15 1 min 00 s 1",
-        "hard & <b> 1 not finished 45 1 1 0.3 – – ",
+        "soft 2 finished 60 0.5 25 % 0.25 0.15 1 min 00 s 1",
+        "hard & <b> 1 not finished 45 1 – 1 0.3 – – ",
         " hard & <b>: births: 1 instead of 2 ",
         "Fitness function: locomotion [weighted velocity].",
         # Six choices of two runs of four: p of both tails is a third at least.
@@ -140,7 +140,7 @@ def test_contents_lead_to_every_section_in_order(read: Reader) -> None:
         "fitness best maximum of judged robots, in the same unit",
         "soft, run 1, seed 7 mean fitness 0.2 at 30 births",
         "mean of 2 runs",
-        "soft: fitness 0.3. Robot 0:2 of soft-1 (soft, run 1, seed 7)",
+        "soft: fitness 0.3, 25 % of it in later windows. Robot 0:2 of soft-1 (soft, ",
         "hard & <b>: no moving picture: no driver <x>",
         "0 reproduced, 1 not reproduced, 1 undecided.",
         "a <b> fitter > 2 / 3 0.25 – \u22121 – – 0.01 not reproduced so",

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 import pytest
 from msgspec.structs import asdict, replace
 
@@ -14,16 +15,18 @@ from schema.errors import (
 from schema.experiment.document import Fitness, Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY
+from schema.experiment.robust import Robust
 from schema.experiment.settings import EvaluationSettings
-from schema.robot.results import Evaluation
+from schema.robot.results import Evaluation, sustained
 from schema.robot.robot import Robot
 from tests.worker.evaluations import with_simulation
-from worker.robot.evaluation import disturbances, evaluate
+from worker.robot.evaluation import disturbances, evaluate, simulate
 from worker.robot.robustness import (
     ChangedSettings,
     all_changes,
     rejudge,
     summary,
+    window_changes,
 )
 
 SETTINGS = with_simulation(Simulation(window_steps=400, drop_m=0.01))
@@ -55,16 +58,18 @@ def test_each_change_changes_one_thing_and_no_duration() -> None:
 def test_all_changes_by_hand() -> None:
     changes = all_changes(SETTINGS)
     counts: dict[str, int] = {}
-    for change in SMALL:
+    for change in changes:
         counts[change.group] = counts.get(change.group, 0) + 1
     assert counts == {
-        "time step": 2, "friction": 4, "start": 12, "mass": 2, "torque": 2,
-        "noise": 2, "ground": 2,
+        "later window": 4, "time step": 2, "friction": 4, "start": 12, "mass": 2,
+        "torque": 2, "noise": 2, "ground": 2,
     }  # fmt: skip
-    assert len({change.name for change in changes}) == len(changes) == 26
+    assert len({change.name for change in changes}) == len(changes) == 30
     found = {change.name: change.settings for change in changes}
     base = SETTINGS.simulation
     expected: dict[str, dict[str, Any]] = {
+        "window 2 to 4 s": {"warmup_steps": 400},
+        "window 8 to 10 s": {"warmup_steps": 1600},
         "friction 0.9": {"friction": 0.9},
         "friction 1.1": {"friction": 1.1},
         "start tilted -1 degree about y": {"start_deg": (0.0, -1.0, 0.0)},
@@ -125,6 +130,43 @@ def test_failed_evaluations_have_no_fitness(
     assert found == [0.5, 0.5, None, *[0.5] * 8]
 
 
+def test_later_windows_follow_that_of_the_evaluation(turtle: Robot) -> None:
+    """Oracle: velocities between the ends of windows of one long simulation."""
+    drawn = replace(
+        SETTINGS,
+        simulation=replace(SETTINGS.simulation, warmup_steps=200),
+        fitness=Fitness(path_weight=0.0, straight_weight=1.0),
+        robust=Robust(),
+    )
+    whole = replace(SETTINGS.simulation, window_steps=5 * 400 + 200)
+    path = simulate(turtle, with_simulation(whole)).core_position[:, :2]
+    ends = path[[5 + 10 * number for number in range(6)]]
+    lengths = np.linalg.norm(np.diff(ends, axis=0), axis=1)
+    changes = window_changes(drawn)
+    assert [one.name for one in changes] == [
+        "window 3 to 5 s", "window 5 to 7 s", "window 7 to 9 s", "window 9 to 11 s"
+    ]  # fmt: skip
+    assert [fitness for _, fitness in rejudge(turtle, changes)] == pytest.approx(
+        (lengths[1:] / 2).tolist(), rel=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("selected", "later", "share"),
+    [
+        (0.4, (0.1, 0.2, 0.3, 0.2), 0.5),
+        (0.4, (0.1, None, 0.3, 0.2), 0.375),
+        (0.0, (0.1, 0.1, 0.1, 0.1), None),
+        (-0.4, (0.1, 0.1, 0.1, 0.1), None),
+        (None, (0.1, 0.1, 0.1, 0.1), None),
+    ],
+)
+def test_sustained(
+    selected: float | None, later: tuple[float | None, ...], share: float | None
+) -> None:
+    assert sustained(selected, later) == pytest.approx(share)
+
+
 @pytest.mark.parametrize(
     ("fitness", "found", "line"),
     [
@@ -136,7 +178,8 @@ def test_failed_evaluations_have_no_fitness(
         (0.1, (0.1, None), "start; 1 of them failed"),
         (-0.2, (-0.25, -0.1), "has a fitness of -0.25 to -0.1 under 2 small changes"),
         (0.3, (None,), "has no fitness under 1 small changes"),
+        (0.125, (0.1,), "start; sustains 25 % in the next 2 windows"),
     ],
 )
 def test_summary(fitness: float, found: tuple[float | None, ...], line: str) -> None:
-    assert line in summary(fitness, found)
+    assert line in summary(fitness, found, (0.0, 0.0625))
