@@ -15,7 +15,7 @@ class Claim:
     """A finding of the thesis.
 
     Attributes:
-        figure: figure of the thesis, or section of its chapter 7.
+        figure: figure of the thesis, or section.
         text: the finding in words.
         measure: column of ``outputs.OUTCOME``.
         a: an experiment.
@@ -106,14 +106,19 @@ _AMONG = ((_ONE, _TWO), (_ONE, _THREE), (_TWO, _THREE))
 _OVER = tuple((a, b) for a in _EVOLVED for b in (_RANDOM, _DRIFT))
 
 
+def _alike(figure: str, what: str, measure: str, *pairs: Pair) -> list[Claim]:
+    """Return the claims that pairs of experiments have no large difference."""
+    text = f"{what}: {{a}} and {{b}} differ by less than a large effect (0.474)"
+    return _of(figure, text, measure, "=", *pairs)
+
+
 def _sizes(figure: str, per_part: str, what: str, measure: str) -> list[Claim]:
     """Return the claims about a size: alike, over the baselines, alike per part."""
     divided = f"{measure}_per_part"
     return [
-        *_of(figure, f"as many {what} in {{a}} as in {{b}}", measure, "=", *_AMONG),
+        *_alike(figure, what, measure, *_AMONG),
         *_of(figure, f"more {what} in {{a}} than in {{b}}", measure, ">", *_OVER),
-        *_of(per_part, f"as many {what} per part in {{a}} as in {{b}}", divided, "=",
-             *_AMONG, *_OVER),
+        *_alike(per_part, f"{what} per part", divided, *_AMONG, *_OVER),
     ]  # fmt: skip
 
 
@@ -128,8 +133,7 @@ CLAIMS: tuple[Claim, ...] = _in_order([
          (_ONE, _RANDOM), (_TWO, _RANDOM)),
     *_of("6.2", "{a} ends fitter than {b}", "fitness", ">",
          (_ONE, _DRIFT), (_TWO, _DRIFT), is_automatic=True),
-    *_of("6.2", "{a} and {b} end without a large difference", "fitness", "=",
-         (_ONE, _TWO)),
+    *_alike("6.2", "fitness at the end", "fitness", (_ONE, _TWO)),
     *_of("6.2", "the spread between runs differs between {a} and {b}", "fitness",
          "!=", (_TWO, _ONE), is_spread=True),
     *_of("6.2", "{a} ends less fit than {b}", "fitness", "<", *_TO_3),
@@ -137,10 +141,14 @@ CLAIMS: tuple[Claim, ...] = _in_order([
           margin=0.01, of=(_DRIFT,), is_automatic=True),
     *_of("6.2", "{a} gains less than a quarter of what {b} gains", "gain", "<",
          (_RANDOM, _ONE), (_RANDOM, _TWO), share=0.25),
+    *_of("6.2.3", "the parts of the best robot's family come from fewer founders in "
+         "{a} than in {b}", "family_founders", "<", (_TWO, _ONE), (_TWO, _THREE)),
+    *_of("6.3", "a smaller share of the gain in fitness comes after half of the births "
+         "in {a} than in {b}", "late_gain", "<", (_TWO, _ONE), *_TO_3,
+         births=FLAT_BIRTHS),
     *_of("6.3", "fitness rises less in {a} than in {b} after half of the births",
          "late_rise", "<", (_TWO, _ONE), *_TO_3, births=FLAT_BIRTHS),
-    *_of("6.4", "as many ancestors per robot in {a} as in {b}", "ancestors_per_robot",
-         "=", (_TWO, _ONE)),
+    *_alike("6.4", "ancestors per robot", "ancestors_per_robot", (_TWO, _ONE)),
     *_of("6.4", "more ancestors per robot in {a} than in {b}", "ancestors_per_robot",
          ">", *_TO_3),
     *_all("6.5", "diversity falls", "diversity_change", "<", margin=1.0),
@@ -164,9 +172,9 @@ CLAIMS: tuple[Claim, ...] = _in_order([
           is_automatic=True),
     *_all("6.9", "robots outgrow random ones", "parts_change", ">", margin=1.0),
     *_all("6.9", "robots are as large as random ones (within 1 part)", "parts_change",
-          "=", margin=1.0, of=(_RANDOM, _DRIFT)),
+          "=", margin=1.0, of=(_DRIFT,)),
     *_of("6.9", "robots are larger in {a} than in {b}", "parts", ">", *_OVER),
-    *_of("6.9", "robots are as large in {a} as in {b}", "parts", "=", *_AMONG),
+    *_alike("6.9", "parts", "parts", *_AMONG),
     *_all("6.9", "larger robots are fitter (all robots of a run)", "parts_fitness",
           ">", margin=0.1, is_automatic=True),
     *_sizes("6.11", "6.12", "joints", "joints"),
@@ -175,6 +183,9 @@ CLAIMS: tuple[Claim, ...] = _in_order([
     *_sizes("6.13", "6.13", "extremities", "extremities"),
     *_all("6.14", "more extremities, more fitness (all robots of a run)",
           "extremities_fitness", ">", margin=0.1, is_automatic=True),
+    *_all("6.14", "from four extremities on fitness changes by less than 0.01 m/s per "
+          "extremity (all robots of a run)", "extremities_slope", "=", margin=0.01,
+          is_automatic=True),
     *_all("6.14", "more extremities per part, less fitness (all robots of a run)",
           "extremities_per_part_fitness", "<", margin=0.1, is_automatic=True),
     *_all("6.15", "most robots have no touch sensor", "without_touch", ">", 0.5,
@@ -195,8 +206,8 @@ CLAIMS: tuple[Claim, ...] = _in_order([
           margin=0.5, of=(*_EVOLVED, _DRIFT)),
     *_all("6.16", "as many hidden neurons as random robots have (within 1)",
           "hidden_change", "=", margin=1.0, of=(_RANDOM,)),
-    *_of("6.16", "as many hidden neurons in {a} as in {b}", "hidden", "=",
-         (_ONE, _DRIFT), (_TWO, _DRIFT), (_THREE, _DRIFT)),
+    *_alike("6.16", "hidden neurons per part", "hidden_per_part",
+            (_ONE, _DRIFT), (_TWO, _DRIFT), (_THREE, _DRIFT)),
     *(claim for number, a in enumerate(_EVOLVED, 18) for claim in (
         *_all(f"6.{number}", "the best robot and ancestors of four levels differ less "
               "than half as much as founders", "family_distance", "<", 0.5,
@@ -213,5 +224,12 @@ CLAIMS: tuple[Claim, ...] = _in_order([
     *_all("7.2.1", "contact time per lifetime (simultaneous contacts count separately) "
           'is below 0.05 (our limit for "small")', "touching", "<", 0.05, margin=0.01,
           of=(TOUCHES,)),
+    *_of("7.2.1", "in the windows after the selected one the best robot is fitter in "
+         "{a} than in {b}", "later_fitness", ">", *_TO_3),
+    *_of("7.2.1", "in these windows the best robot has a greater share of its fitness "
+         "in {a} than in {b}", "sustained", ">", *_TO_3),
+    *_of("7.2.1", "under changes of time step, friction and start the best robot keeps "
+         "a greater share of its fitness in {a} than in {b}", "kept_fitness", ">",
+         *_TO_3),
 ])  # fmt: skip
 """Findings in the order of the thesis's figures."""

@@ -37,6 +37,7 @@ Row = dict[str, Any]
 OF_FITNESS = frozenset({
     "fitness", "fitness_best", "late_gain", "late_rise", "variability", "gain",
     "qd_score", "hypervolume", "later_fitness",
+    "extremities_slope",
 })  # fmt: skip
 """Measures whose values depend on the scale of the fitness function."""
 OF_GRID = frozenset({

@@ -15,6 +15,9 @@ from analysis.measures.populations import RETENTION_BIRTHS
 from analysis.measures.winners import LATER
 from schema.experiment.document import Experiment
 
+MANY = 4
+"""Extremities from which on fitness is flat, says the thesis of figure 6.14a."""
+
 
 def outcome(
     tables: Mapping[str, pa.Table], births: int, settings: Sequence[Experiment]
@@ -140,13 +143,39 @@ def _of_robots(
     random = born.filter(pc.field("ancestors") == 0)
     judged = _table(tables, "robots", judged_again).filter(is_born)
     fitness = _column(judged, "fitness")
-    return {
-        f"{name}_change": last.get(name, math.nan) - _mean(_column(random, name))
-        for name in ("parts", "touch_sensors", "hidden")
-    } | {
-        f"{name}_fitness": _correlation(_column(judged, name), fitness)
-        for name in ("parts", "extremities", "extremities_per_part")
-    }
+    return (
+        {
+            f"{name}_change": last.get(name, math.nan) - _mean(_column(random, name))
+            for name in ("parts", "touch_sensors", "hidden")
+        }
+        | {
+            f"{name}_fitness": _correlation(_column(judged, name), fitness)
+            for name in ("parts", "extremities", "extremities_per_part")
+        }
+        | {"extremities_slope": slope(_column(judged, "extremities"), fitness)}
+    )
+
+
+def slope(
+    extremities: Numbers, fitness: Numbers, robots: Numbers | None = None
+) -> float:
+    """Return the change of fitness per extremity from ``MANY`` on.
+
+    Args:
+        extremities: (N,) of each robot, or of a bin.
+        fitness: (N,) of the robot, or the mean of the bin.
+        robots: (N,) robots of each bin; None: one each.
+
+    Returns:
+        Slope of the least squares; NaN unless two numbers of extremities occur.
+    """
+    counts = np.ones(len(fitness)) if robots is None else robots
+    is_many = (extremities >= MANY) & ~np.isnan(fitness)
+    x, y, counts = extremities[is_many], fitness[is_many], counts[is_many]
+    if len(x) < 2 or not np.ptp(x):  # noqa: PLR2004
+        return math.nan
+    away = x - np.average(x, weights=counts)
+    return float((counts * away * y).sum() / (counts * away**2).sum())
 
 
 def _own_measures(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
@@ -179,6 +208,7 @@ def _of_lives(
         **{name: _mean(_column(robots, name)) for name in LATER},
         "variability": float(np.median(ranges)) if len(ranges) else math.nan,
         "between": float(between[-1]) if len(between) else math.nan,
+        "kept_fitness": math.nan,
         "real_time_factor": math.nan,
         "touched": _mean(_column(contacts, "touched")),
         "touching": _mean(_column(contacts, "touching")),

@@ -92,6 +92,8 @@ OUTCOME = {
     "hidden_change": "hidden neurons, last population minus random robots",
     "extremities_fitness": "rank correlation of fitness and extremities, all robots",
     "extremities_per_part_fitness": "the same for extremities per part",
+    "extremities_slope": "change of fitness per extremity, of all robots of four or "
+    "more (least squares)",
     "variability": "median of the robots' variability (on-line)",
     "touched": "share of robots that ever touched another robot (on-line)",
     "between": "mean tree edit distance between islands",
@@ -104,6 +106,8 @@ OUTCOME = {
     "later_fitness": "mean fitness of the best robot of the last population, alone, in "
     "the four windows after that of its evaluation",
     "sustained": "later_fitness divided by the fitness in the window of its evaluation",
+    "kept_fitness": "share of its fitness that the best robot keeps under changes of "
+    "time step, friction and start (revolve robustness)",
     "touching": "contact time of robots divided by their lifetimes; simultaneous "
     "contacts count separately (on-line)",
     "real_time_factor": "simulated by wall-clock time of 30 robots (bench arena)",

@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from scipy import optimize, stats
@@ -47,7 +48,34 @@ def _rows(experiment: str) -> list[Row]:
             rise = last["fitness"].mean() - middle["fitness"].mean()
             early = first["diversity"].mean()
             found.append(row | {"late_rise": rise, "early_diversity": early})
+            if end == max(course.index):
+                found[-1] |= _of_best(experiment, row["run"], path.name)
     return found
+
+
+def _of_best(experiment: str, run: int, file: str) -> Row:
+    """Return outcomes of the best robot, and the slope of fitness by extremities."""
+    robots = pd.read_csv(DATA / "windows" / "robots.csv")
+    own = robots[(robots["experiment"] == experiment) & (robots["run"] == run)]
+    bins = pd.read_parquet(DATA / "extremities" / file).dropna(subset="fitness")
+    many = bins[(bins["by"] == "count") & (bins["population"] == "born")]
+    many = many[many["bin"] >= 4]
+    found: Row = {"extremities_slope": None}
+    if len(many) > 1:
+        weights = np.sqrt(many["robots"])
+        slope, _ = np.polyfit(many["bin"], many["fitness"], 1, w=weights)
+        found["extremities_slope"] = slope
+    if own.empty:
+        return found | dict.fromkeys(("later_fitness", "sustained", "kept_fitness"))
+    first, *later = own.filter(regex="^window ").fillna(0.0).iloc[0]
+    groups = [own.filter(regex=f"^{name}").mean(axis=1).iloc[0]
+              for name in ("time step", "friction", "start")]  # fmt: skip
+    is_positive = first > 0
+    return found | {
+        "later_fitness": np.mean(later),
+        "sustained": np.mean(later) / first if is_positive else None,
+        "kept_fitness": np.mean(groups) / first if is_positive else None,
+    }
 
 
 def _values(experiment: str, measure: str, births: int) -> Numbers:
@@ -55,7 +83,8 @@ def _values(experiment: str, measure: str, births: int) -> Numbers:
         path = DATA / "bench" / "arena.parquet"
         rows = pq.read_table(path).to_pylist() if path.exists() else []
         return np.array([row["factor"] for row in rows if row["population"] == 30])
-    found = [row[measure] for row in _rows(experiment) if row["births"] == births]
+    rows = (row for row in _rows(experiment) if row["births"] == births)
+    found = [row.get(measure) for row in rows]
     return np.array([value for value in found if value is not None], np.float64)
 
 

@@ -5,11 +5,14 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
 from PIL import Image
 
+import revolve as rv
 from analysis.figures.catalogue import FIGURES
 from analysis.measures.outputs import OUTPUTS, schema
 from schema.tables.description import description_text, read_description
@@ -71,6 +74,7 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
         assert run["function"] == "worker.fitness:thesis"
         assert run["failures"] >= 0
         assert 0 < run["duration_s"] < 300
+    _check_later_windows(report.parent / "runs" / "a", measures)
     (arena,) = measures["interactions"].to_pylist()
     assert arena["robots"] == 25
     assert 0 < arena["touched"] <= 1
@@ -84,6 +88,29 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
         ("runs/c", "the same run"),
     ]
     assert "left out: runs/d: run: run.json" in output
+
+
+def _check_later_windows(folder: Path, measures: dict[str, pa.Table]) -> None:
+    """Check what best robots sustain, one of each run, against evaluations here."""
+    rows = measures["robots"].filter(pc.field("later_fitness").is_valid()).to_pylist()
+    assert sorted(Path(row["folder"]).name for row in rows) == ["a", "b", "e"]
+    (own,) = (row for row in rows if Path(row["folder"]).name == "a")
+    run = rv.Run(folder)
+    (best,) = run.best()
+    assert best.origin is not None
+    assert own["birth"] == best.origin.birth.number
+    windows = [
+        rv.evaluate(
+            best, run.experiment.replace(simulation={"warmup_steps": 2400 * number})
+        ).fitness
+        or 0.0
+        for number in range(5)
+    ]
+    later = sum(windows[1:]) / 4
+    assert own["later_fitness"] == pytest.approx(later, rel=1e-12)
+    assert own["sustained"] == pytest.approx(later / own["fitness"], rel=1e-12)
+    ends = measures["outcomes"].filter(pc.field("folder") == own["folder"])
+    assert ends["sustained"].to_pylist() == [own["sustained"]]
 
 
 def test_experiments_of_the_same_name_get_distinct_names(

@@ -7,15 +7,17 @@ import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
-from analysis.comparison.comparison import Outcomes, RunOutcomes
-from analysis.comparison.outcomes import of_courses
+from analysis.comparison.comparison import Outcomes, RunOutcomes, known
+from analysis.comparison.outcomes import of_courses, slope
 from analysis.measures.outputs import BODY, schema
+from analysis.measures.population_table import Numbers
 from analysis.measures.winners import LATER
 from docs.studies.pages import DOCS, csv_rows
 from schema.robot.results import later_fitness, sustained
@@ -65,7 +67,17 @@ PARTS = (
         ("scenario1", "scenario2", "no-selection", "no-reproduction"),
         repeats=30,
     ),
-    Part("arena", "thesis-arena", ("scenario3",), repeats=10, batch=2),
+    Part("arena", "thesis-arena", ("scenario3",), repeats=30, batch=2),
+    Part(
+        "windows",
+        "thesis-windows",
+        tuple(
+            f"{name}-{kind}"
+            for kind in ("warm", "drawn", "reevaluated")
+            for name in ("scenario1", "scenario2")
+        ),
+        repeats=10,
+    ),
     Part(
         "touches",
         "thesis-touches",
@@ -83,6 +95,9 @@ COURSES = ("late_rise", "early_diversity")
 WINDOWS = Path("windows") / "robots.csv"
 """Fitness of best robots in five windows, which outcomes of later windows follow from:
 all start as in scenario 1."""
+SLOPE = "extremities_slope"
+"""Outcome that is computed from the kept ``extremities``, at the end."""
+OF_WINDOWS = (*LATER, "kept_fitness")
 SELECTED = "window 0 to 12 s"
 LATER_COLUMNS = tuple(
     f"window {start} to {start + 12} s" for start in range(12, 60, 12)
@@ -91,7 +106,7 @@ LATER_COLUMNS = tuple(
 
 def _of_analysis(table: str) -> pa.Schema:
     """Return the columns of ``revolve analyze``, but the repeat for the folder."""
-    names = {"experiment", "folder", *COURSES, *LATER}
+    names = {"experiment", "folder", *COURSES, *OF_WINDOWS, SLOPE}
     fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
     return pa.schema([*NAMES, *fields])
 
@@ -236,7 +251,7 @@ def kept(data: Path, table: str) -> pa.Table:
     found = pa.concat_tables(pieces)
     if table != "outcomes":
         return found
-    return _with_later_windows(_with_courses(found, data), data)
+    return _with_windows(_with_courses(found, data), data)
 
 
 def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
@@ -259,38 +274,68 @@ def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
     return outcomes
 
 
-def windows(data: Path, experiment: str) -> list[list[float | None]]:
-    """Return the fitness of an experiment's best robots in five windows, by repeat."""
-    return [
-        each for (name, _), each in sorted(_windows(data).items()) if name == experiment
-    ]
+def windows(data: Path, experiment: str) -> Numbers:
+    """Return the fitness of an experiment's best robots in five windows, (R, 5).
+
+    Failed evaluations count 0.
+    """
+    rows = [row for row in csv_rows(data / WINDOWS) if row["experiment"] == experiment]
+    rows.sort(key=lambda row: int(row["run"]))
+    columns = (SELECTED, *LATER_COLUMNS)
+    return np.array([[float(row[key] or 0.0) for key in columns] for row in rows])
 
 
-def _windows(data: Path) -> dict[tuple[str, int], list[float | None]]:
+def _of_windows(row: dict[str, str]) -> dict[str, float | None]:
+    """Return the outcomes that follow from a row of ``WINDOWS``."""
+
+    def value(key: str) -> float | None:
+        return float(row[key]) if row[key] else None
+
+    first, later = value(SELECTED), list(map(value, LATER_COLUMNS))
+    groups = ("time step", "friction", "start")
+    shares = [
+        [each / first for key in row if key.startswith(group)
+         if (each := value(key)) is not None]
+        for group in groups
+        if first is not None and first > 0
+    ]  # fmt: skip
+    kept_fitness = fmean(map(fmean, shares)) if shares else None
+    values = later_fitness(later), sustained(first, later), kept_fitness
+    return dict(zip(OF_WINDOWS, values, strict=True))
+
+
+def _slopes(data: Path) -> dict[str, float | None]:
+    """Return ``SLOPE`` by repeat."""
+    rows = kept(data, "extremities")
+    is_of = (pc.field("by") == "count") & (pc.field("population") == "born")
+    born = rows.filter(is_of).to_pandas()
     return {
-        (row["experiment"], int(row["run"])): [
-            float(row[key]) if row[key] else None for key in (SELECTED, *LATER_COLUMNS)
-        ]
-        for row in csv_rows(data / WINDOWS)
-    }
+        name: known(slope(*(mine[key].to_numpy(np.float64)
+                            for key in ("bin", "fitness", "robots"))))
+        for name, mine in born.groupby("folder")
+    }  # fmt: skip
 
 
-def _with_later_windows(outcomes: pa.Table, data: Path) -> pa.Table:
-    """Return the rows of ``outcomes`` with those of ``LATER``, at the end of runs."""
-    every = _windows(data)
+def _with_windows(outcomes: pa.Table, data: Path) -> pa.Table:
+    """Return the rows of ``outcomes`` with ``OF_WINDOWS`` and ``SLOPE``, at the end."""
+    rows = {(row["experiment"], int(row["run"])): _of_windows(row)
+            for row in csv_rows(data / WINDOWS)}  # fmt: skip
+    keys = outcomes.select(["experiment", "run", "births"]).to_pylist()
     ends: dict[tuple[str, int], int] = {}
-    rows = outcomes.select(["experiment", "run", "births"]).to_pylist()
-    for row in rows:
+    for row in keys:
         key = row["experiment"], row["run"]
         ends[key] = max(row["births"], ends.get(key, 0))
-    found: dict[str, list[float | None]] = {name: [] for name in LATER}
-    for row in rows:
+    found: list[dict[str, float | None]] = []
+    for row in keys:
         key = row["experiment"], row["run"]
-        is_known = key in every and row["births"] == ends[key]
-        first, *later = every[key] if is_known else [None]
-        found["later_fitness"].append(later_fitness(later) if later else None)
-        found["sustained"].append(sustained(first, later) if later else None)
-    for name, values in found.items():
+        found.append(rows.get(key, {}) if row["births"] == ends[key] else {})
+    names = outcomes["folder"].to_pylist()
+    slopes = _slopes(data)
+    for row, each, name in zip(keys, found, names, strict=True):
+        if row["births"] == ends[row["experiment"], row["run"]]:
+            each[SLOPE] = slopes[name]
+    for name in (*OF_WINDOWS, SLOPE):
+        values = [each.get(name) for each in found]
         outcomes = outcomes.append_column(name, pa.array(values, pa.float64()))
     return outcomes
 

@@ -13,6 +13,7 @@ from analysis.comparison.statistics import ALPHA, alike_power
 from analysis.figures.style import in_order, label, pair_name
 from docs.studies.pages import Parts, markdown
 from docs.studies.thesis.data import PARTS
+from docs.studies.thesis.later import bridges, parts_of, topics
 
 Tables = Mapping[str, pa.Table]
 Row = dict[str, Any]
@@ -80,7 +81,9 @@ def pages_of(tables: Tables) -> dict[str, Parts]:
             "differences": _differences(tables),
             "controls": _controls(tables),
             "speed": _speed(tables),
+            **parts_of(tables),
         },
+        "starts.md": {"bridges": bridges()},
         "findings.md": {"power": _power(tables), "all": _all(tables)},
     }
 
@@ -206,6 +209,7 @@ def _verdicts(tables: Tables) -> list[str]:
     repeats = f"{_last(tables)['scenario3'].num_rows} of {_PLANNED['scenario3']}"
     lines = [
         f"Of {len(rows)} findings: **{_counts(rows)}**.",
+        f"- {topics(rows)}",
         f"- Without the {len(rows) - len(sure)} marked †: {_counts(sure)}.",
         f"- Without scenario 3 ({repeats} repeats): {_counts(off_line)}.",
     ]

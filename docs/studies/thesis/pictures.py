@@ -22,13 +22,14 @@ from analysis.figures.findings import effects
 from analysis.figures.style import in_order
 from analysis.render.stage import choose_engine
 from docs.studies.pages import PICTURES
+from docs.studies.thesis.later import windows_figure
 
 Tables = Mapping[str, pa.Table]
 
 _DIGEST = "rows"
 """Key of the digest in a PNG; in a JPEG it is the comment."""
-_WIDTHS = {"progression.png": 1152, "findings.png": 1300, "arena-speed.png": 900,
-           "gaits.jpg": 1100, "ancestry.jpg": 900}  # fmt: skip
+_WIDTHS = {"progression.png": 1152, "windows.png": 1152, "findings.png": 1300,
+           "arena-speed.png": 900, "gaits.jpg": 1100, "ancestry.jpg": 900}  # fmt: skip
 """Width of each picture [pixels]."""
 _EFFECT = [
     "figure", "topic", "expected", "a", "b", "mean_b", "verdict", "near_automatic",
@@ -53,6 +54,7 @@ def _sources(tables: Tables) -> dict[str, pa.Table]:
     found = {
         "progression.png": fitness,
         "findings.png": tables["findings"].select(_EFFECT),
+        "windows.png": tables["windows"],
         "gaits.jpg": pa.concat_tables(best.values()),
         "ancestry.jpg": best[_TREE],
     }
@@ -127,6 +129,7 @@ def draw(tables: Tables) -> Iterator[str]:
             f"mean fitness [{_UNIT}]",
         ).draw(),
         "findings.png": lambda: effects(tables),
+        "windows.png": lambda: windows_figure(tables).draw(),
         "arena-speed.png": lambda: speed(tables, "arena").draw(),
     }
     stale = {

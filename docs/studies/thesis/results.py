@@ -18,6 +18,7 @@ from analysis.comparison.progression import progression
 from analysis.measures.benchmarks import read_benchmarks
 from docs.studies.pages import Parts, command
 from docs.studies.thesis.data import DATA, kept, kept_outcomes
+from docs.studies.thesis.later import rows_of_windows
 from docs.studies.thesis.parts import pages_of
 
 _TABLES = ("outcomes", "populations", "runs", "family")
@@ -31,6 +32,7 @@ def tables_of(data: Path) -> dict[str, pa.Table]:
         data: folder of the rows.
     """
     tables = {name: kept(data, name) for name in _TABLES}
+    tables["windows"] = rows_of_windows(data)
     tables["benchmark"], _ = read_benchmarks([data / "bench"])
     tables["progression"] = progression(tables["populations"])
     outcomes = kept_outcomes(tables["outcomes"])

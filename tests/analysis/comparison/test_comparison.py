@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pytest
+from scipy import stats
 
 from analysis.comparison.claims import ARENA, CLAIMS, Claim
 from analysis.comparison.comparison import comparison, outcomes_of
@@ -18,7 +20,7 @@ from analysis.comparison.findings import (
     verdict,
     with_benchmark,
 )
-from analysis.comparison.outcomes import outcome
+from analysis.comparison.outcomes import outcome, slope
 from analysis.measures.load import LoadedRun
 from analysis.measures.outputs import OUTCOME, OUTPUTS
 from analysis.measures.study import MeasuredRun
@@ -455,3 +457,24 @@ def test_claims_name_existing_measures() -> None:
     figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
     assert figures == sorted(figures)
     assert len({claim.text for claim in CLAIMS}) == len(CLAIMS)
+
+
+def test_slope_by_extremities_is_that_of_all_robots_of_four_or_more() -> None:
+    """Oracle: SciPy's regression; bins of equal robots have the slope of the robots."""
+    rng = np.random.default_rng(5)
+    counts = rng.integers(1, 12, 200).astype(float)
+    fitness = 0.01 * counts + rng.normal(0, 0.1, 200)
+    is_many = counts >= 4
+    wanted = stats.linregress(counts[is_many], fitness[is_many]).slope
+    assert slope(counts, fitness) == pytest.approx(wanted)
+    bins = np.unique(counts)
+    means = np.array([fitness[counts == each].mean() for each in bins])
+    robots = np.array([(counts == each).sum() for each in bins], np.float64)
+    assert slope(bins, means, robots) == pytest.approx(wanted)
+    assert math.isnan(slope(np.array([4.0, 4.0, 1.0]), np.array([0.1, 0.2, 0.3])))
+
+
+def test_what_differs_by_less_than_a_large_effect_names_its_margin() -> None:
+    alike = [one for one in CLAIMS if one.expected == "=" and one.b]
+    assert len(alike) > 40
+    assert all(f"({LARGE:g})" in one.text for one in alike)

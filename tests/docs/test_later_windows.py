@@ -1,0 +1,108 @@
+"""Later windows on docs/results.md, recomputed with SciPy; dates of all claims."""
+
+import re
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.comparison.claims import CLAIMS
+from docs.studies.thesis.data import DATA
+from docs.studies.thesis.later import dates, key_of
+from docs.studies.thesis.windows import missing
+
+PAGE = Path(__file__).parents[2] / "docs" / "results.md"
+LABELS = {"scenario 1": "scenario1", "scenario 2": "scenario2",
+          "scenario 3": "scenario3", "no reproduction": "no-reproduction",
+          "no selection": "no-selection"}  # fmt: skip
+
+
+def cells_of(part: str) -> list[list[str]]:
+    """Return the cells of a generated table, heads first."""
+    found = re.search(f"<!-- begin: {part} -->\n(.*?)<!-- end -->", PAGE.read_text(),
+                      re.DOTALL)  # fmt: skip
+    assert found
+    lines = [line for line in found[1].splitlines() if not line.startswith("|---")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def fitness_of(label: str) -> pd.DataFrame:
+    """Return the fitness of an experiment's best robots by window."""
+    rows = pd.read_csv(DATA / "windows" / "robots.csv")
+    mine = rows[rows["experiment"] == LABELS.get(label, label)]
+    return mine.filter(regex=r"^window ").fillna(0.0)
+
+
+def test_all_best_robots_are_evaluated() -> None:
+    assert missing(DATA) == []
+
+
+def test_medians_of_windows_are_recomputed() -> None:
+    heads, *rows = cells_of("windows")
+    for at, head in enumerate(heads[1:], 1):
+        label, _, runs = head.partition(" (")
+        found = fitness_of(label)
+        assert len(found) == int(runs.split()[0])
+        medians = found.median().tolist()
+        assert [float(row[at]) for row in rows[:5]] == pytest.approx(medians, abs=6e-4)
+        positive = found[found.iloc[:, 0] > 0]
+        shares = positive.iloc[:, 1:].mean(axis=1) / positive.iloc[:, 0]
+        percent = float(rows[5][at].removesuffix(" %"))
+        assert percent == pytest.approx(100 * shares.median(), abs=0.51)
+
+
+def test_comparisons_from_36_s_on_are_recomputed_with_scipy() -> None:
+    _, *rows = cells_of("late")
+    assert len(rows) >= 6
+    for names, medians, effect, p in rows:
+        a, b = (fitness_of(name).iloc[:, 3:].mean(axis=1) for name in names.split(", "))
+        test = stats.mannwhitneyu(a, b, method="exact")
+        delta = 2 * test.statistic / (len(a) * len(b)) - 1
+        assert float(effect.split()[0]) == pytest.approx(delta, abs=0.006)
+        assert float(p) == pytest.approx(test.pvalue, rel=0.06)
+        wanted = [a.median(), b.median()]
+        found = [float(each) for each in medians.split("; ")]
+        assert found == pytest.approx(wanted, abs=6e-4)
+
+
+def test_numbers_of_the_first_who_looked_come_out_again() -> None:
+    """Medians over 26, 27, 9 and 28 robots that another program simulated."""
+    earlier = {
+        "scenario 1": (0.262, 0.079, 0.052, 0.035),
+        "scenario 2": (0.208, 0.069, 0.053, 0.062),
+        "scenario 3": (0.065, 0.083, 0.084, 0.085),
+        "no reproduction": (0.054, 0.037, 0.042, 0.044),
+    }
+    for label, wanted in earlier.items():
+        ours = fitness_of(label).median().to_numpy()[[0, 1, 2, 4]]
+        assert ours == pytest.approx(wanted, rel=0.15, abs=0.006), label
+
+
+def test_every_claim_has_a_date_and_none_is_later_than_the_next() -> None:
+    known = dates()
+    keys = [
+        key_of({"figure": one.figure, "measure": one.measure, "a": one.a,
+                "b": one.b or "", "expected": one.expected, "text": one.text})
+        for one in CLAIMS
+    ]  # fmt: skip
+    assert known.keys() == set(keys)
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\d", date) for date in known.values())
+    stages = [row[0] for row in cells_of("stages")[1:]]
+    assert set(known.values()) == set(stages)
+    assert all(first < second for first, second in pairwise(stages))
+
+
+def test_convergence_is_recomputed() -> None:
+    rows = cells_of("convergence")[1:]
+    for label, runs, effect, _ in rows:
+        folder = DATA / "outcomes"
+        found = pd.concat(
+            pd.read_parquet(path).nlargest(1, "births")
+            for path in sorted(folder.glob(f"{LABELS[label]}-[0-9][0-9].parquet"))
+        )
+        ranks = found[["diversity", "fitness"]].rank()
+        assert len(found) == int(runs)
+        assert float(effect) == pytest.approx(np.corrcoef(ranks.T)[0, 1], abs=0.006)
