@@ -13,13 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 from scipy.interpolate import RegularGridInterpolator
 from scipy.stats import friedmanchisquare
 
-from analysis.comparison.statistics import mean_difference
+from analysis.comparison.statistics import ALPHA, mean_difference
 from analysis.figures.sweeps import sweep_map
 from docs.studies.pages import DOCS, Parts, command, markdown, save_small
 
@@ -36,6 +37,7 @@ SHOWN = {
     "birth_s": ("simulated time per birth [s]", 1),
 }
 """Outcomes of the table of the check: heading, and number of decimals."""
+DRAWS = 500
 TESTED = {
     "fitness": "mean fitness",
     "fitness_best": "best fitness",
@@ -110,6 +112,7 @@ def pages() -> dict[str, Parts]:
         "shares": setting_lines(grid, SHARE),
         "limits": setting_lines(kept(LIMIT), POPULATION_LIMIT),
         "effects": effect_lines(grid),
+        "power": power_lines(grid),
         "check": check_lines(grid, kept(CHECK)),
     }
     return {"arena_settings.md": parts}
@@ -148,20 +151,54 @@ def effect_lines(grid: Frame) -> list[str]:
         ["outcome", "interval: p", "share: p", "variance between repeats"],
         [],
     )
-    repeats = grid.index.str.rpartition("-").get_level_values(2)
     for measure, name in TESTED.items():
-        rows = grid.assign(repeat=repeats)
-        found = []
-        for setting, other in ((INTERVAL, SHARE), (SHARE, INTERVAL)):
-            blocks = rows.pivot_table(
-                index=["repeat", other], columns=setting, values=measure
-            ).dropna()
-            found.append(friedmanchisquare(*blocks.to_numpy().T).pvalue)
+        found = [
+            friedmanchisquare(*blocks_of(grid, measure, setting).T).pvalue
+            for setting in (INTERVAL, SHARE)
+        ]
+        rows = grid.assign(repeat=_repeats(grid))
         means = rows.groupby("repeat")[measure].transform("mean")
         between = means.var(ddof=0) / rows[measure].var(ddof=0)
         cells = (f"{p:.2g}" for p in found)
         lines.append([name, *cells, f"{100 * between:.0f} %"])
     return markdown(heads, lines)
+
+
+def blocks_of(grid: Frame, measure: str, setting: str) -> np.ndarray[Any, Any]:
+    """Return an outcome by the values of a setting, (B, V).
+
+    A block has the same repeat, so the same founders, and the same other setting.
+    """
+    other = SHARE if setting == INTERVAL else INTERVAL
+    rows = grid.assign(repeat=_repeats(grid))
+    blocks = rows.pivot_table(
+        index=["repeat", other], columns=setting, values=measure
+    ).dropna()
+    return np.asarray(blocks)
+
+
+def _repeats(grid: Frame) -> Any:  # noqa: ANN401 - pandas
+    return grid.index.str.rpartition("-").get_level_values(2)
+
+
+def power_lines(grid: Frame) -> list[str]:
+    """Return a table: how often Friedman's test finds an effect on mean fitness.
+
+    In each of ``DRAWS`` draws the runs of a block are permuted, so that the setting has
+    no effect; then the fitness at one of its five values is multiplied.
+    """
+    lines, rng = [], np.random.default_rng(1)
+    for factor in (1, 2, 3):
+        cells = []
+        for setting in (INTERVAL, SHARE):
+            blocks, hits = blocks_of(grid, "fitness", setting), 0
+            for _ in range(DRAWS):
+                drawn = rng.permuted(blocks, axis=1)
+                drawn[:, 0] *= factor
+                hits += int(friedmanchisquare(*drawn.T).pvalue < ALPHA)
+            cells.append(f"{100 * hits / DRAWS:.0f} %")
+        lines.append([f"{factor}", *cells])
+    return markdown(["mean fitness at one value, times", "interval", "share"], lines)
 
 
 def check_lines(grid: Frame, others: Frame) -> list[str]:

@@ -23,6 +23,7 @@ from msgspec import structs
 from analysis.comparison.statistics import mean_difference, rank_sum_p
 from docs.studies.pages import DOCS, Parts, command, csv_rows, markdown
 from docs.studies.tasks import best_robot, last_population
+from docs.studies.thesis.data import DATA, SELECTED, WINDOWS
 from schema.experiment.document import Experiment
 from schema.experiment.settings import evaluation_settings_of
 from schema.robot.robot import Robot
@@ -127,6 +128,19 @@ def winners(experiment: str, rows: Sequence[Row]) -> list[str]:
     return markdown(heads, lines)
 
 
+def campaign_winners() -> list[str]:
+    """Return what the best robots of the campaign's repeats of ``BASE`` keep."""
+    rows = [row for row in csv_rows(DATA / WINDOWS) if row["experiment"] == BASE]
+    lines = []
+    for text, first, end in (("0 to 9", 0, 10), ("10 to 29", 10, 30), ("all", 0, 30)):
+        own = [row for row in rows if first <= int(row["run"]) < end]
+        under = np.mean([numbers(own, change) for change in CHANGES], axis=0)
+        shares = 100 * under / np.array(numbers(own, SELECTED))
+        spread = f"({shares.min():.0f} to {shares.max():.0f} %)"
+        lines.append([text, str(len(own)), f"{np.median(shares):.1f} % {spread}"])
+    return markdown([f"repeats of `{BASE}`", "runs", "kept (range)"], lines)
+
+
 def _of(experiment: str, rows: Sequence[Row]) -> list[Row]:
     return [row for row in rows if row["experiment"] == experiment]
 
@@ -144,6 +158,7 @@ def pages() -> dict[str, Parts]:
         "robustness.md": {
             "equal evaluations": compared("robust", rows),
             "winners": winners("robust", rows),
+            "campaign winners": campaign_winners(),
         },
     }
 

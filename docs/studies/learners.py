@@ -170,9 +170,9 @@ def courses() -> dict[tuple[str, str], np.ndarray[tuple[int, int, int]]]:
 
 def lines() -> list[str]:
     """Return the lines of the table: means over bodies, intervals over seeds."""
-    more = "more than `random` (95 % interval)"
-    heads = ["bodies", "learner", "at birth", "after 20 trials", more,
-             "after 60 trials", more, "better, of 100"]  # fmt: skip
+    more = ["more than `random` (95 % interval)", f"better, of {BODIES} bodies", "p"]
+    heads = ["bodies", "learner", "at birth", "after 20 trials", *more,
+             "after 60 trials", *more]  # fmt: skip
     found, rows = courses(), []
     for (bodies, learner), best in found.items():
         cells = [bodies, f"`{learner}`", f"{best[:, :, 0].mean():.4f}"]
@@ -181,16 +181,18 @@ def lines() -> list[str]:
                 each[:, :, trials - 1] for each in (best, found[bodies, BASE])
             )
             cells.append(f"{reached.mean():.4f}")
-            cells.append("" if learner == BASE else _interval(reached - base))
-        cells.append("" if learner == BASE else str((reached > base).sum()))
+            cells += [""] * 3 if learner == BASE else _more(reached - base)
         rows.append(cells)
     return markdown(heads, rows)
 
 
-def _interval(more: np.ndarray[tuple[int, int]]) -> str:
-    """Return the mean of differences (seed, body) and its interval over seeds."""
-    middle, low, high = mean_difference(more.mean(axis=1), 0.0)
-    return f"{middle:+.4f} ({low:+.4f} to {high:+.4f})"
+def _more(more: np.ndarray[tuple[int, int]]) -> list[str]:
+    """Return mean, interval, sign and p of differences (seed, body) over bodies."""
+    bodies = more.mean(axis=0)
+    middle, low, high = mean_difference(bodies, 0.0)
+    p = stats.wilcoxon(bodies, method="exact").pvalue
+    return [f"{middle:+.4f} ({low:+.4f} to {high:+.4f})", str((bodies > 0).sum()),
+            f"{p:.2g}"]  # fmt: skip
 
 
 def draw() -> None:
