@@ -15,6 +15,8 @@ from analysis.measures.populations import RETENTION_BIRTHS
 from analysis.measures.winners import LATER
 from schema.experiment.document import Experiment
 
+BORN_BY_COUNT = (pc.field("by") == "count") & (pc.field("population") == "born")
+"""Rows of ``extremities`` about all robots, by their number."""
 MANY = 4
 """Extremities from which on fitness is flat, says the thesis of figure 6.14a."""
 
@@ -143,36 +145,29 @@ def _of_robots(
     random = born.filter(pc.field("ancestors") == 0)
     judged = _table(tables, "robots", judged_again).filter(is_born)
     fitness = _column(judged, "fitness")
-    return (
-        {
-            f"{name}_change": last.get(name, math.nan) - _mean(_column(random, name))
-            for name in ("parts", "touch_sensors", "hidden")
-        }
-        | {
-            f"{name}_fitness": _correlation(_column(judged, name), fitness)
-            for name in ("parts", "extremities", "extremities_per_part")
-        }
-        | {"extremities_slope": slope(_column(judged, "extremities"), fitness)}
-    )
+    return {
+        f"{name}_change": last.get(name, math.nan) - _mean(_column(random, name))
+        for name in ("parts", "touch_sensors", "hidden")
+    } | {
+        f"{name}_fitness": _correlation(_column(judged, name), fitness)
+        for name in ("parts", "extremities", "extremities_per_part")
+    }
 
 
-def slope(
-    extremities: Numbers, fitness: Numbers, robots: Numbers | None = None
-) -> float:
+def slope(extremities: Numbers, fitness: Numbers, robots: Numbers) -> float:
     """Return the change of fitness per extremity from ``MANY`` on.
 
     Args:
-        extremities: (N,) of each robot, or of a bin.
-        fitness: (N,) of the robot, or the mean of the bin.
-        robots: (N,) robots of each bin; None: one each.
+        extremities: (N,) of each bin.
+        fitness: (N,) mean of its robots.
+        robots: (N,) number of its robots.
 
     Returns:
-        Slope of the least squares; NaN unless two numbers of extremities occur.
+        Slope of the least squares over robots; NaN for less than two such bins.
     """
-    counts = np.ones(len(fitness)) if robots is None else robots
     is_many = (extremities >= MANY) & ~np.isnan(fitness)
-    x, y, counts = extremities[is_many], fitness[is_many], counts[is_many]
-    if len(x) < 2 or not np.ptp(x):  # noqa: PLR2004
+    x, y, counts = extremities[is_many], fitness[is_many], robots[is_many]
+    if len(x) < 2:  # noqa: PLR2004
         return math.nan
     away = x - np.average(x, weights=counts)
     return float((counts * away * y).sum() / (counts * away**2).sum())
@@ -200,6 +195,8 @@ def _of_lives(
     distances = (_column(families, name) for name in ("distance", "founder_distance"))
     ranges = _column(lives.filter(pc.field("birth") < births), "variability")
     ranges = ranges[~np.isnan(ranges)]
+    bins = _table(tables, "extremities").filter(BORN_BY_COUNT)
+    many = (_column(bins, name) for name in ("bin", "fitness", "robots"))
     until = _table(tables, "between").filter(pc.field("births") <= births)
     between = _column(until, "between")
     return {
@@ -208,6 +205,7 @@ def _of_lives(
         **{name: _mean(_column(robots, name)) for name in LATER},
         "variability": float(np.median(ranges)) if len(ranges) else math.nan,
         "between": float(between[-1]) if len(between) else math.nan,
+        "extremities_slope": math.nan if going_on else slope(*many),
         "kept_fitness": math.nan,
         "real_time_factor": math.nan,
         "touched": _mean(_column(contacts, "touched")),

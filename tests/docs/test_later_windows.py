@@ -29,10 +29,11 @@ def cells_of(part: str) -> list[list[str]]:
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 
-def fitness_of(label: str) -> pd.DataFrame:
-    """Return the fitness of an experiment's best robots by window."""
+def fitness_of(label: str, runs: int = 1000) -> pd.DataFrame:
+    """Return the fitness of the best robots of an experiment's first runs by window."""
     rows = pd.read_csv(DATA / "windows" / "robots.csv")
-    mine = rows[rows["experiment"] == LABELS.get(label, label)]
+    is_wanted = (rows["experiment"] == LABELS.get(label, label)) & (rows["run"] < runs)
+    mine = rows[is_wanted]
     return mine.filter(regex=r"^window ").fillna(0.0)
 
 
@@ -77,11 +78,12 @@ def test_numbers_of_the_first_who_looked_come_out_again() -> None:
         "no reproduction": (0.054, 0.037, 0.042, 0.044),
     }
     for label, wanted in earlier.items():
-        ours = fitness_of(label).median().to_numpy()[[0, 1, 2, 4]]
+        runs = 10 if label == "scenario 3" else 30
+        ours = fitness_of(label, runs).median().to_numpy()[[0, 1, 2, 4]]
         assert ours == pytest.approx(wanted, rel=0.15, abs=0.006), label
 
 
-def test_every_claim_has_a_date_and_none_is_later_than_the_next() -> None:
+def test_every_claim_has_a_date_of_a_stage() -> None:
     known = dates()
     keys = [
         key_of({"figure": one.figure, "measure": one.measure, "a": one.a,

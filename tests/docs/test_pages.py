@@ -61,6 +61,12 @@ def test_tutorial_runs(name: str, tmp_path: Path) -> None:
     _run(TUTORIALS / f"{name}.md", tmp_path)
 
 
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+def test_page_about_starts_runs_with_fewer_births(tmp_path: Path) -> None:
+    _run(DOCS / "starts.md", tmp_path, "150=16")
+
+
 @pytest.mark.parametrize(
     "page",
     [

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from analysis.comparison.comparison import Outcomes, RunOutcomes, known
-from analysis.comparison.outcomes import of_courses, slope
+from analysis.comparison.outcomes import BORN_BY_COUNT, of_courses, slope
 from analysis.measures.outputs import BODY, schema
 from analysis.measures.population_table import Numbers
 from analysis.measures.winners import LATER
@@ -306,9 +306,7 @@ def _of_windows(row: dict[str, str]) -> dict[str, float | None]:
 
 def _slopes(data: Path) -> dict[str, float | None]:
     """Return ``SLOPE`` by repeat."""
-    rows = kept(data, "extremities")
-    is_of = (pc.field("by") == "count") & (pc.field("population") == "born")
-    born = rows.filter(is_of).to_pandas()
+    born = kept(data, "extremities").filter(BORN_BY_COUNT).to_pandas()
     return {
         name: known(slope(*(mine[key].to_numpy(np.float64)
                             for key in ("bin", "fitness", "robots"))))

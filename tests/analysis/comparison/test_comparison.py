@@ -466,12 +466,12 @@ def test_slope_by_extremities_is_that_of_all_robots_of_four_or_more() -> None:
     fitness = 0.01 * counts + rng.normal(0, 0.1, 200)
     is_many = counts >= 4
     wanted = stats.linregress(counts[is_many], fitness[is_many]).slope
-    assert slope(counts, fitness) == pytest.approx(wanted)
     bins = np.unique(counts)
     means = np.array([fitness[counts == each].mean() for each in bins])
     robots = np.array([(counts == each).sum() for each in bins], np.float64)
     assert slope(bins, means, robots) == pytest.approx(wanted)
-    assert math.isnan(slope(np.array([4.0, 4.0, 1.0]), np.array([0.1, 0.2, 0.3])))
+    few = np.array([3.0, 4.0])
+    assert math.isnan(slope(few, few, few))
 
 
 def test_what_differs_by_less_than_a_large_effect_names_its_margin() -> None:
