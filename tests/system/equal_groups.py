@@ -8,7 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.system.groups import differing_tables
+from coordinator.storage.compare import compare
 
 BIRTHS = {"archipelago-ring": 45, "archipelago-arenas": 25, "archipelago-mixed": 30}
 NUMBERS = (2, 5)
@@ -17,15 +17,8 @@ NUMBERS = (2, 5)
 def run(name: str, folder: Path, coordinators: int) -> Path:
     """Run an archipelago with seed 7; return its folder."""
     words = ("run", name, "--seed", "7", "--births", str(BIRTHS[name]), "--quiet")
-    where = (
-        "--workers",
-        "2",
-        "--coordinators",
-        str(coordinators),
-        "--out",
-        str(folder),
-    )
-    program = (sys.executable, "-m", "revolve", *words, *where)
+    where = ("--coordinators", str(coordinators), "--out", str(folder))
+    program = (sys.executable, "-m", "revolve", *words, "--workers", "2", *where)
     subprocess.run(program, check=True, stdout=subprocess.DEVNULL)
     return folder
 
@@ -38,8 +31,7 @@ def main(folder: Path, names: list[str]) -> int:
         for number in NUMBERS:
             most = min(number, 4) if name == "archipelago-arenas" else number
             place = run(name, folder / f"{name}-{most}", most)
-            groups = [place / f"group-{each}" for each in range(most)]
-            found = differing_tables(whole, groups)
+            found = compare(whole, place)
             outcome = ", ".join(found) or "equal"
             sys.stderr.write(f"{name}, {most} groups: {outcome}\n")
             code |= bool(found)

@@ -9,6 +9,7 @@ import zenoh
 
 from coordinator.islands.events import Immigrated
 from coordinator.islands.exchange import MigrantsReply
+from coordinator.storage.compare import compare
 from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
@@ -17,7 +18,6 @@ from schema.wire.codec import decode, encode
 from schema.wire.migration import MigrantsRequest
 from tests.system.documents import RING
 from tests.system.fleet import kill_beyond, size
-from tests.system.groups import differing_tables
 from tests.system.workspace import Process, Workspace, free_address, wait_until
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
@@ -76,7 +76,7 @@ def test_two_groups_have_the_births_of_one_coordinator(workspace: Workspace) -> 
     assert "migrants: liar.1: migrants that cannot be those of the archipelago" in told
     assert "got those of epoch 1" in told
     assert 0.2 * size(whole) < reached < size(folders[0])
-    assert differing_tables(whole, folders) == []
+    assert compare(whole, workspace.folder / "two") == []
     longer_groups_equal_a_longer_run(workspace, folders)
 
 
@@ -89,7 +89,7 @@ def longer_groups_equal_a_longer_run(workspace: Workspace, folders: list[Path]) 
     assert "two/group-1: 160 of 160 births" in told
     assert all(new > old for new, old in zip(map(size, folders), before, strict=True))
     longer = workspace.finished(RING, 40, "longer")
-    assert differing_tables(longer, folders) == []
+    assert compare(longer, workspace.folder / "two") == []
 
 
 def end_of(process: Process) -> str:
@@ -115,4 +115,4 @@ def test_one_command_runs_all_groups(workspace: Workspace) -> None:
     assert [line.split(":")[0] for line in told.splitlines() if "births" in line] == [
         f"three/group-{number}" for number in range(3)
     ]
-    assert differing_tables(whole, folders) == []
+    assert compare(whole, workspace.folder / "three") == []
