@@ -19,12 +19,16 @@ def parser(_command: str = "join") -> Flags:
             "Commands that read runs do not need it: they take the folder that holds "
             "all groups as one run."
         ),
-        examples=("revolve join runs/a/group-* --out runs/whole",),
+        examples=(
+            "revolve join runs/a --out runs/whole",
+            "revolve join runs/a/group-0 elsewhere/group-1 --out runs/whole",
+        ),
     )
+    about = "folder of a group, or the one that holds all groups"
+    flags.add_argument("groups", metavar="GROUP", nargs="+", help=about)
     flags.add_argument(
-        "groups", metavar="FOLDER", nargs="+", help="of a group, or of all groups"
+        "--out", metavar="FOLDER", required=True, help="folder to write to"
     )
-    flags.add_argument("--out", metavar="FOLDER", required=True, help="of the new run")
     return flags
 
 

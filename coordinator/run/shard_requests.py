@@ -10,6 +10,7 @@ from functools import partial
 
 from msgspec import structs
 
+from coordinator.arena.drift import Drift, with_losses
 from coordinator.dispatch.events import Assign, Deliver, Read
 from coordinator.dispatch.fleet import JobRouter
 from coordinator.dispatch.shard_places import ShardPlaces
@@ -18,7 +19,6 @@ from coordinator.parts.arena_parts import EXCHANGE_S
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
 )
-from coordinator.run.drift import Drift, with_losses
 from coordinator.run.part_requests import PartRequests
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_answers import (

@@ -21,6 +21,7 @@ from typing import Any
 import zenoh
 
 from schema.agent.inbox import Inbox
+from schema.agent.job_service import WaitingJobs
 from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.machine import (
     memory_bytes,
@@ -38,7 +39,6 @@ from schema.agent.supervisor import (
     stop_with_parent,
 )
 from schema.agent.topics import Member, check_name, unique_name
-from schema.agent.waiting_jobs import WaitingJobs
 from schema.errors import NetworkError, counted
 from schema.limits import MOST_SHOWN, printable
 from schema.plugins.permission import allow

@@ -133,14 +133,22 @@ def groups_of(folder: Path) -> list[Path]:
     There are none in a folder with a run of its own, or without groups.
 
     Raises:
-        RunFolderError: as of ``check_groups``.
+        RunFolderError: as of ``check_groups``, or a group is damaged.
     """
     found = [each.parent for each in sorted(folder.glob(f"*/{DETAILS}"))]
     if (folder / DETAILS).exists() or not found:
         return []
-    known = {each: read_description(each) for each in found}
+    known: dict[Path, Description] = {}
+    damaged: list[RunFolderError] = []
+    for each in found:
+        try:
+            known[each] = read_description(each)
+        except RunFolderError as error:
+            damaged.append(error)
     if all(each.group == WHOLE for each in known.values()):
         return []
+    if damaged:
+        raise damaged[0]
     return check_groups(known)
 
 

@@ -642,7 +642,7 @@ def test_an_unfit_agent_looks_at_each_waiting_job_once(
     assert looks < 12 * 1000
 
 
-def test_many_waiting_jobs_are_withdrawn_in_linear_time() -> None:
+def test_many_job_service_are_withdrawn_in_linear_time() -> None:
     def seconds(jobs: int) -> float:
         dispatch = told(*requests(*range(jobs)))
         began_s = time.process_time()

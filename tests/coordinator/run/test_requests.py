@@ -1,12 +1,11 @@
 """Requests about single robots: results of answers, and lies that are refused."""
 
-import dataclasses
 import math
 from functools import partial
 from typing import Literal
 
 import pytest
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
 from coordinator.dispatch.events import AgentKind, Joined, Left, Returned
 from coordinator.islands.events import (
@@ -270,7 +269,7 @@ def test_only_an_audit_finds_a_child_that_is_not_of_its_parents(share: float) ->
         assert events == [lie]
         return
     assert events == []
-    ((fault, peer, _),) = map(dataclasses.astuple, sent_requests.fleet.faults.counts)
+    ((fault, peer, _),) = map(astuple, sent_requests.fleet.faults.counts)
     assert (fault, peer) == ("malformed", "judge")
     assert sent_requests.sent[-1][1] == "juror"
     assert sent_requests.tell(sent_requests.reply(CHILD)) == [CHILD]

@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 
 from schema.agent.inbox import Inbox
+from schema.agent.job_service import QUICK_S, WaitingJobs
 from schema.agent.network import Agent
 from schema.agent.request_handler import ReplyCounts, Server
-from schema.agent.waiting_jobs import QUICK_S, WaitingJobs
 from schema.limits import BUNDLE_BYTES, MOST_BUNDLED
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode
@@ -82,7 +82,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     made = Clock()
-    monkeypatch.setattr("schema.agent.waiting_jobs.time", made)
+    monkeypatch.setattr("schema.agent.job_service.time", made)
     return made
 
 
