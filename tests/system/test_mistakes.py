@@ -89,7 +89,7 @@ MISTAKES = [
     ("view run --save a.gif --from 1e5 --until 1.1e5", "no poses of an arena between"),
     ("view x --connect hub", "give either a run folder or --connect"),
     ("view --connect tcp/127.0.0.1:1 --save a.rrd", "no hub at"),
-    ("view nowhere --serve 9876", "must be HOST:PORT"),
+    ("view other --serve 9876", "must be HOST:PORT"),
     ("view nowhere --follow x", "must be N or ISLAND:N in whole numbers >= 0"),
     ("view run --ancestry", "needs --robot best"),
     ("view --connect tcp/127.0.0.1:1 --robot best", "a run folder only"),
@@ -246,6 +246,7 @@ def test_a_port_in_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "run").mkdir()
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert main(["view", "run", "--serve", f"127.0.0.1:{port}"]) == 2
