@@ -28,7 +28,7 @@ window_steps = 400
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a data set of two repeats of the campaign and of a run."""
     place = tmp_path_factory.mktemp("dataset")
-    for table in (*FILES.values(), "populations"):
+    for table in (*FILES.values(), "populations", "extremities"):
         (place / "data" / table).mkdir(parents=True)
         for name in REPEATS:
             shutil.copy(DATA / table / f"{name}.parquet", place / "data" / table)
