@@ -26,7 +26,12 @@ from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.hints import command, stopped
 from schema.agent.log import tell_error, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
-from schema.agent.supervisor import GRACE_S, stop_on_signals, stop_with_parent
+from schema.agent.supervisor import (
+    GRACE_S,
+    start_without_ctrl_c,
+    stop_on_signals,
+    stop_with_parent,
+)
 from schema.errors import (
     ExperimentError,
     MalformedMessage,
@@ -205,12 +210,7 @@ def _flags(deployment: Deployment, address: str) -> list[str]:
 def _start(main: Main, words: list[str]) -> SpawnProcess:
     """Start the coordinator of a group."""
     process = get_context("spawn").Process(target=_coordinate, args=(main, words))
-    # A Ctrl-C of the terminal reaches all; only this process may act on it.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        process.start()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    start_without_ctrl_c(process)
     return process
 
 

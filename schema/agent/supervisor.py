@@ -202,14 +202,7 @@ class ProcessPool:
         process = self._context.Process(
             target=self._body, args=(*self._arguments, slot)
         )
-        # A Ctrl-C of the terminal reaches all; only this process may act on it. The
-        # tracker first: starting it unblocks SIGINT.
-        resource_tracker.ensure_running()
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            process.start()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        start_without_ctrl_c(process)
         return process
 
     def wait(self, timeout_s: float) -> None:
@@ -269,6 +262,20 @@ def stop_with_input(stop: Callable[[], object]) -> None:
         stop()
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def start_without_ctrl_c(process: SpawnProcess) -> None:
+    """Start a process that a Ctrl-C in the terminal does not reach.
+
+    The terminal sends it to all processes; only this one may act on it.
+    """
+    # The tracker first: starting it unblocks SIGINT.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        process.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def stop_with_parent(stop: Callable[[], object]) -> None:
