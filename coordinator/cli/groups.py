@@ -18,7 +18,7 @@ from msgspec import structs
 from coordinator.cli.deployment import Deployment, own_hub, own_processes
 from coordinator.cli.progress import Display
 from coordinator.cli.status_text import births_done, run_details
-from coordinator.network.client_service import ask_coordinators
+from coordinator.network.client_service import asking
 from coordinator.run.group_link import births_digest
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.folder import read_details
@@ -150,6 +150,8 @@ def execute_groups(
     failed: dict[Path, int] = {}
     with ExitStack() as stack:
         address = stack.enter_context(own_hub(folder, deployment))
+        agent = deployment.agent
+        ask = stack.enter_context(asking(address, fleet=agent.fleet, tls=agent.tls))
         pools = stack.enter_context(own_processes(deployment, address))
         running: dict[Path, SpawnProcess] = {}
         stack.callback(_end, running)
@@ -157,7 +159,7 @@ def execute_groups(
             running[path] = _start(main, [*words, *_flags(deployment, address)])
         display = stack.enter_context(Display(None, quiet=deployment.quiet))
         while running and not failed and not stop.wait(_TURN_S):
-            display.show(_progress(address, deployment, known), time.monotonic())
+            display.show(_progress(ask, known), time.monotonic())
             for line in chain.from_iterable(pool.look_after() for pool in pools):
                 warn_user(line)
             failed = _take_ended(running)
@@ -180,16 +182,13 @@ def execute_groups(
 
 
 def _progress(
-    address: str, deployment: Deployment, known: dict[str, RunStatus]
+    ask: Callable[[bytes], dict[str, bytes]], known: dict[str, RunStatus]
 ) -> Status:
     """Return the progress of all groups; of one that does not answer, the last."""
     found = [_NO_STATUS]
     with suppress(NetworkError, MalformedMessage):
-        agent, request = deployment.agent, OperatorRequest(uuid4().hex, 0, GetStatus())
-        replies = ask_coordinators(
-            encode(request), connect=address, fleet=agent.fleet, tls=agent.tls
-        )
-        for data in replies.values():
+        request = OperatorRequest(uuid4().hex, 0, GetStatus())
+        for data in ask(encode(request)).values():
             status = decode_operator_reply(data).status or _NO_STATUS
             own = [run for run in status.runs if run.folder in known]
             known |= {run.folder: run for run in own}

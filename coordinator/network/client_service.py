@@ -3,8 +3,8 @@
 import socket
 import threading
 import time
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from secrets import token_hex
 from uuid import uuid4
@@ -44,26 +44,43 @@ def ask_coordinators(
     Raises:
         NetworkError: no hub, or no coordinator replies.
     """
+    with asking(connect, fleet=fleet, tls=tls, only=only) as ask:
+        return ask(data)
+
+
+@contextmanager
+def asking(
+    connect: str, *, fleet: str = DEFAULT_FLEET, tls: Tls | None = None, only: str = ""
+) -> Iterator[Callable[[bytes], dict[str, bytes]]]:
+    """Yield ``ask_coordinators`` of an address, which keeps one session.
+
+    Raises:
+        NetworkError: no hub.
+    """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
     try:
         session = open_session(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(why_no_hub(connect, tls)) from None
-    replies_of: dict[str, bytes] = {}
-    with session:
+
+    def ask(data: bytes) -> dict[str, bytes]:
         there = coordinators(session, fleet)
+        replies_of: dict[str, bytes] = {}
         for member in sorted(there, key=lambda each: each.name):
             if only in ("", member.name):
                 reply = reply_of(member, session, data)
                 if reply is not None:
                     replies_of[member.name] = reply
-    if not replies_of:
+        if replies_of:
+            return replies_of
         # The hub drops what a certificate may not send, without an answer.
         role = "; only an operator's certificate may ask" * connect.startswith("tls/")
         who = f"none of {len(there)} coordinators" if there else "no coordinator"
         raise NetworkError(f"{connect}: {who} of fleet {fleet} replies{role}")
-    return replies_of
+
+    with session:
+        yield ask
 
 
 def coordinators(
