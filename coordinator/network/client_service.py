@@ -123,11 +123,15 @@ def reply_of(
         consolidation=_NOW,
     )
     for reply in replies:
-        replier = reply.replier_id
-        is_own = replier is not None and str(replier.zid) == member.session
-        if is_own and reply.ok is not None:
+        if reply.ok is not None and is_from(member, reply):
             return reply.ok.payload.to_bytes()
     return None
+
+
+def is_from(member: Member, reply: zenoh.Reply) -> bool:
+    """Return whether a process's own session sent a reply; others can use its key."""
+    replier = reply.replier_id
+    return replier is not None and str(replier.zid) == member.session
 
 
 ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")

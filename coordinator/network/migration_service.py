@@ -10,6 +10,7 @@ from typing import Any
 
 import zenoh
 
+from coordinator.network.client_service import is_from
 from coordinator.network.operator_service import OperatorQuery
 from schema.agent.topics import Member, announced_by_all, member_of, migrants_of_all
 from schema.errors import MalformedMessage
@@ -36,13 +37,12 @@ class SentRequest:
         """Keep a reply that a coordinator sent by its own key."""
         if reply.ok is None or len(self.replies) >= MOST_PEERS:
             return
-        key, replier = str(reply.ok.key_expr), reply.replier_id
+        key = str(reply.ok.key_expr)
         try:
             member = member_of(f"{key.rpartition('/')[0]}/alive")
         except MalformedMessage:
             return
-        is_own = replier is not None and str(replier.zid) == member.session
-        if is_own and key == member.migrants:
+        if key == member.migrants and is_from(member, reply):
             self.replies.append((member.name, reply.ok.payload.to_bytes()))
 
 
