@@ -1,7 +1,7 @@
 """Summary of a finished run: best robots, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -67,14 +67,16 @@ def restore_best(folder: Path) -> None:
     A process that ends after its run, but before the summary, leaves no file. Errors
     are those of ``conclude``.
     """
-    last = () if (folder / BEST).exists() else last_populations(folder)
-    best = _best_here(folder, last)
+    if (folder / BEST).exists():
+        return
+    births = births_of(folder)
+    best = _best_here(last_populations(folder), births)
     if best is None:
         return
     try:
         allow_plugins_of(folder, is_resumed=False)
         experiment = experiment_from_text(read_details(folder).document, is_own=True)
-        if _is_extinct(folder, experiment):
+        if _is_extinct(folder, experiment, births):
             return
         _, robot = _read_best(folder, best, experiment)
         done = _write_best(robot, folder, experiment)
@@ -85,15 +87,16 @@ def restore_best(folder: Path) -> None:
     tell_user(f"{folder}: {BEST} was missing; {_BEST}: {done}")
 
 
-def _is_extinct(folder: Path, experiment: Experiment) -> bool:
+def _is_extinct(
+    folder: Path, experiment: Experiment, births: Mapping[int, int]
+) -> bool:
     """Return whether all islands of a finished run are extinct arenas.
 
-    An arena with all births of the experiment is none, even if its last robots are
-    too few to mate, and neither is one with robots at its ``end_s``.
+    ``births``: as of ``births_of``; a group of islands has none of the others. An
+    arena with all births of the experiment is not extinct, even if its last robots
+    are too few to mate, and neither is one with robots at its ``end_s``.
     """
-    births, names = births_of(folder), ["island", "sim_time_s"]
-    owns = island_experiments(experiment)
-    # A group of islands has no rows of the others.
+    owns, names = island_experiments(experiment), ["island", "sim_time_s"]
     islands = {number: owns[number] for number in births}
     if not all(own.arena for own in islands.values()):
         return False
@@ -128,12 +131,13 @@ def _results(folder: Path, experiment: Experiment) -> list[str]:
     The tables, not the living: robots of an arena have newer windows at the end of a
     run than the last population has, which status and report show.
     """
-    births = counted(births_of(folder).total(), "birth")
-    if _is_extinct(folder, experiment):
+    here = births_of(folder)
+    births = counted(here.total(), "birth")
+    if _is_extinct(folder, experiment, here):
         return [f"extinct after {births}: no robot is left that can have a child"]
     islands = island_experiments(experiment)
     last = last_populations(folder)
-    best = _best_here(folder, last)
+    best = _best_here(last, here)
     if best is None:
         return [f"{births}; no robot of the last population has a fitness"]
     # As analyses compute it: robots of arenas without a fitness do not count.
@@ -183,13 +187,12 @@ def _best_robot(folder: Path, best: Row, experiment: Experiment) -> list[str]:
     ]
 
 
-def _best_here(folder: Path, last: Iterable[Row]) -> Row | None:
+def _best_here(last: Iterable[Row], births: Mapping[int, int]) -> Row | None:
     """Return the best row of a robot whose birth the tables have.
 
     They lack those of migrants from another group of islands.
     """
-    here = births_of(folder)
-    return best_of(row for row in last if individual(row).island in here)
+    return best_of(row for row in last if individual(row).island in births)
 
 
 def _better_ever(folder: Path, best: Row) -> list[str]:

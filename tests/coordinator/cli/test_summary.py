@@ -14,6 +14,7 @@ from coordinator.cli.campaign_table import (
     outcome_of,
     show_outcomes,
 )
+from coordinator.storage.folder_status import births_of
 from schema.errors import RunFolderError
 from schema.experiment.document import (
     ArenaSection,
@@ -97,9 +98,10 @@ def test_run_is_extinct_if_all_of_its_arenas_have_too_few_births(
 ) -> None:
     experiment = Experiment("e", births=births, arena=ArenaSection(), islands=islands)
     write_tables(tmp_path, {"births": [{"birth": 0}, {"birth": 1}]})
-    assert summary._is_extinct(tmp_path, experiment) is is_extinct
+    born = births_of(tmp_path)
+    assert summary._is_extinct(tmp_path, experiment, born) is is_extinct
     off_line = structs.replace(experiment, arena=None)
-    assert not summary._is_extinct(tmp_path, off_line)
+    assert not summary._is_extinct(tmp_path, off_line, born)
 
 
 @pytest.mark.parametrize(
@@ -120,7 +122,8 @@ def test_an_arena_with_robots_at_its_end_is_not_extinct(
     samples = [{"birth": 1, "sim_time_s": sampled_s}] if sampled_s else []
     write_tables(tmp_path, {"births": founders, "fitness": samples})
     experiment = Experiment("e", births=3, arena=ArenaSection(end_s=end_s))
-    assert summary._is_extinct(tmp_path, experiment) is is_extinct
+    born = births_of(tmp_path)
+    assert summary._is_extinct(tmp_path, experiment, born) is is_extinct
 
 
 @pytest.mark.parametrize(
@@ -181,8 +184,9 @@ def test_the_best_robot_of_a_group_was_born_in_it(tmp_path: Path) -> None:
     write_tables(tmp_path, {"births": [{"island": 0, "birth": 3}]})
     here = {"island": 0, "birth_island": None, "birth": 3, "fitness": 0.1}
     migrant = {"island": 0, "birth_island": 1, "birth": 2, "fitness": 0.3}
-    assert summary._best_here(tmp_path, [migrant, here]) == here
-    assert summary._best_here(tmp_path, [migrant]) is None
+    born = births_of(tmp_path)
+    assert summary._best_here([migrant, here], born) == here
+    assert summary._best_here([migrant], born) is None
 
 
 def test_each_experiment_has_a_row() -> None:
