@@ -170,10 +170,7 @@ class JobRouter:
             timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         self.tell(Ticked(now_s))
         # Waking up for each answer would cost more than the answers themselves.
-        is_awaited = any(
-            home.advance is not None for home in self.homes.shards.values()
-        )
-        pause_s = 0.0 if is_awaited else self.dispatch.pause_s
+        pause_s = 0.0 if self.homes.are_busy else self.dispatch.pause_s
         for event in self._agents.receive(timeout_s, min(timeout_s, pause_s)):
             self.tell(event)
         ends, self._ends = self._ends, {}

@@ -113,6 +113,11 @@ class Homes:
         wanted = sum(home.advance is not None for home in self.shards.values())
         return wanted - self.unassigned
 
+    @property
+    def are_busy(self) -> bool:
+        """Some advance is requested."""
+        return any(home.advance is not None for home in self.shards.values())
+
     def holder(self, shard: int) -> str:
         """Return the name of the worker that holds a shard; empty if none does."""
         home = self.shards.get(shard)
