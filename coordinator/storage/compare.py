@@ -65,11 +65,14 @@ def _of_campaigns(*folders: Path) -> list[str]:
     runs = [path.name for each in folders for path, _ in read_campaign(each).runs(each)]
     differences: dict[str, list[str]] = {}
     for name in dict.fromkeys(runs):
+        pair = [folder / name for folder in folders]
+        if lost := [each for each in pair if not each.exists()]:
+            differences[name] = [f"{lost[0]}: no such folder"]
+            continue
         try:
-            differences[name] = compare(*(folder / name for folder in folders))
+            differences[name] = compare(*pair)
         except RunFolderError as error:
-            # Another run of the campaign is not meant.
-            differences[name] = [str(error).partition("; did you mean")[0]]
+            differences[name] = [str(error)]
     differing = [name for name, found in differences.items() if found]
     lines = [f"{name}: {line}" for name in differing for line in differences[name]]
     total = counted(len(differences), "run")
