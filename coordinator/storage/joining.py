@@ -47,11 +47,17 @@ def join_groups(given: Sequence[Path], out: Path) -> None:
 
     Raises:
         RunFolderError: a group is missing, doubled, of another archipelago or not
-            finished; the new folder is not empty; or a disk fails.
+            finished, or has other births; the new folder is not empty; or a disk fails.
     """
     folders = [one for each in given for one in groups_of(each) or [each]]
-    groups = check_groups({each: read_description(each) for each in folders})
+    known = {each: read_description(each) for each in folders}
+    groups = check_groups(known)
     for each in groups:
+        if known[each].document != known[groups[0]].document:
+            raise RunFolderError(
+                f"{each}: must have as many births as {groups[0]}; to continue it: "
+                f"{command('resume', each)} --births N"
+            )
         if read_state(each) != "finished" or not is_sealed(each):
             raise RunFolderError(
                 f"{each}: is not finished; to continue it: {command('resume', each)}"

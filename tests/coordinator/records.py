@@ -7,6 +7,7 @@ import pyarrow as pa
 
 from coordinator.islands.events import Record
 from coordinator.islands.rows import origin_columns
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.tables.columns import TABLES
 from schema.tables.description import RunDetails
@@ -85,6 +86,27 @@ def make_records(
                 for birth in range(number - 2, number + 1)
             )
     return rows
+
+
+def write_run(
+    path: Path,
+    rows: list[Record],
+    details: RunDetails = DETAILS,
+    *,
+    is_finished: bool = True,
+) -> Path:
+    """Write the folder of a run; return it."""
+    with RunFolder(path, details) as held:
+        recorder = Recorder(path, details, seal=held.seal)
+        for record in rows:
+            recorder.write(record)
+        if is_finished:
+            recorder.finish()
+            held.set_state("finished")
+        else:
+            recorder.flush()
+            recorder.close()
+    return path
 
 
 def feed_rows(folder: Path, rows: list[Record], every: int = 10) -> Recorder:

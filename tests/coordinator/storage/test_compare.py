@@ -11,33 +11,14 @@ from msgspec.structs import replace
 from coordinator.islands.events import Record
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunFolder
-from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.file import experiment_text
-from schema.tables.description import RunDetails
 from schema.tables.files import read_table
-from tests.coordinator.records import make_records
+from tests.coordinator.records import make_records, write_run
 
-DETAILS = RunDetails("test", 0, 1, "{}")
 START = datetime(2026, 1, 1, tzinfo=UTC)
 BIRTH = make_records(1)[0]
-
-
-def written(path: Path, rows: list[Record], *, is_finished: bool = True) -> Path:
-    """Write a run; return its folder."""
-    with RunFolder(path, DETAILS) as held:
-        recorder = Recorder(path, DETAILS)
-        for record in rows:
-            recorder.write(record)
-        if is_finished:
-            recorder.finish()
-            held.set_state("finished")
-        else:
-            recorder.flush()
-            recorder.close()
-    return path
 
 
 def changed(rows: list[Record], index: int, column: str, value: object) -> list[Record]:
@@ -51,14 +32,14 @@ def compared(
     folder: Path, one: list[Record], other: list[Record], *, is_finished: bool = True
 ) -> list[str]:
     """Return the differences of a finished run and another one."""
-    first = written(folder / "a", one)
-    return compare(first, written(folder / "b", other, is_finished=is_finished))
+    first = write_run(folder / "a", one)
+    return compare(first, write_run(folder / "b", other, is_finished=is_finished))
 
 
 @pytest.mark.parametrize("is_finished", [True, False])
 def test_equal_runs_have_no_difference(tmp_path: Path, *, is_finished: bool) -> None:
-    first = written(tmp_path / "a", make_records(12))
-    second = written(tmp_path / "b", make_records(12), is_finished=is_finished)
+    first = write_run(tmp_path / "a", make_records(12))
+    second = write_run(tmp_path / "b", make_records(12), is_finished=is_finished)
     ids = [read_table(run, "births")["run_id"].unique() for run in (first, second)]
     assert [len(each) for each in ids] == [1, 1]
     assert ids[0] != ids[1]
@@ -110,8 +91,8 @@ def test_not_a_number_equals_itself(tmp_path: Path) -> None:
 
 
 def test_missing_rows_are_counted_and_the_common_ones_compared(tmp_path: Path) -> None:
-    first = written(tmp_path / "a", make_records(12))
-    second = written(tmp_path / "b", make_records(9), is_finished=False)
+    first = write_run(tmp_path / "a", make_records(12))
+    second = write_run(tmp_path / "b", make_records(9), is_finished=False)
     assert compare(first, second) == [
         "births: 12 rows against 9",
         f"{second}: is not finished, so it has fewer rows",
@@ -126,18 +107,18 @@ def test_islands_are_compared_one_by_one(tmp_path: Path) -> None:
         replace(each, row={**each.row, "island": index % 2})
         for index, each in enumerate(births)
     ]
-    first = written(tmp_path / "a", rows)
-    second = written(tmp_path / "b", rows[:7], is_finished=False)
+    first = write_run(tmp_path / "a", rows)
+    second = write_run(tmp_path / "b", rows[:7], is_finished=False)
     shorter = [
         "births: 12 rows against 7",
         f"{second}: is not finished, so it has fewer rows",
     ]
     assert compare(first, second) == shorter
-    other = written(tmp_path / "c", changed(rows, 5, "rank", 40))
+    other = write_run(tmp_path / "c", changed(rows, 5, "rank", 40))
     assert compare(second, other)[1] == (
         "births: first at record 2 of island 1, column rank: 2 against 40"
     )
-    moved = written(tmp_path / "d", changed(rows, 11, "island", 0))
+    moved = write_run(tmp_path / "d", changed(rows, 11, "island", 0))
     assert compare(first, moved) == ["births: 6 rows of island 0 against 7"]
 
 
@@ -151,8 +132,8 @@ def test_the_last_smaller_brood_of_a_shorter_run_is_named_and_left_out(
     assert [each.table for each in shorter[-4:]] == ["evaluations", *["population"] * 3]
     if not is_equal:
         shorter = changed(shorter, 15, "fitness", 0.25)
-    first = written(tmp_path / "a", shorter)
-    second = written(tmp_path / "b", make_records(12))
+    first = write_run(tmp_path / "a", shorter)
+    second = write_run(tmp_path / "b", make_records(12))
     early = (
         f"population: not compared at 8 births of island 0, where the last brood of "
         f"{first} ends and that of the longer run goes on"
@@ -183,7 +164,7 @@ def test_a_run_without_a_recorded_platform_differs_from_none(tmp_path: Path) -> 
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
-    first = written(tmp_path / "a", make_records(3))
+    first = write_run(tmp_path / "a", make_records(3))
     with pytest.raises(RunFolderError, match=rf"holds several runs; .* as {first}$"):
         compare(first, tmp_path)
     (tmp_path / "empty").mkdir()
@@ -240,7 +221,7 @@ def campaign(
     folder.mkdir()
     write_campaign(folder, Campaign(documents, repeats, 1))
     for name, birth in births.items():
-        written(folder / name, one_birth(birth))
+        write_run(folder / name, one_birth(birth))
     return folder
 
 

@@ -9,9 +9,7 @@ from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunFolder
 from coordinator.storage.joining import join_groups
-from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.file import experiment_text
@@ -19,7 +17,7 @@ from schema.experiment.identity import Group
 from schema.tables.columns import TABLES
 from schema.tables.description import RunDetails, groups_of, read_state, run_columns
 from schema.tables.files import has_rows, read_table, rows_of_island
-from tests.coordinator.records import make_records
+from tests.coordinator.records import make_records, write_run
 
 ISLANDS = 5
 DOCUMENT = experiment_text(
@@ -49,35 +47,19 @@ def rows(islands: Sequence[int], hours: int) -> list[Record]:
     ]
 
 
-def written(
-    path: Path, details: RunDetails, rows: list[Record], *, is_finished: bool = True
-) -> Path:
-    with RunFolder(path, details) as held:
-        recorder = Recorder(path, details, seal=held.seal)
-        for record in rows:
-            recorder.write(record)
-        if is_finished:
-            recorder.finish()
-            held.set_state("finished")
-        else:
-            recorder.flush()
-            recorder.close()
-    return path
-
-
 def groups(folder: Path, of: int, **last: bool) -> Path:
     """Write the groups of an archipelago, the last one differently."""
     for number in range(of):
         own = list(range(ISLANDS))[number::of]
         flags = last if number == of - 1 else {}
         details = group_details(number, of)
-        written(folder / f"g{of - number}", details, rows(own, 1 + number), **flags)
+        write_run(folder / f"g{of - number}", rows(own, 1 + number), details, **flags)
     return folder
 
 
 @pytest.fixture
 def whole(tmp_path: Path) -> Path:
-    return written(tmp_path / "whole", WHOLE, rows(range(ISLANDS), 1))
+    return write_run(tmp_path / "whole", rows(range(ISLANDS), 1), WHOLE)
 
 
 @pytest.mark.parametrize("is_finished", [True, False])
@@ -136,7 +118,7 @@ def test_other_folders_are_refused(
 ) -> None:
     folder = tmp_path / "groups"
     for number, details in enumerate([group_details(0, 3), *others]):
-        written(folder / f"g{number}", details, rows([], 1))
+        write_run(folder / f"g{number}", rows([], 1), details)
     with pytest.raises(RunFolderError, match=story):
         groups_of(folder)
     with pytest.raises(RunFolderError, match=story):
@@ -149,6 +131,17 @@ def test_groups_are_joined_when_all_are_finished(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="g1: is not finished; to continue it: "):
         join_groups([folder], tmp_path / "out")
     assert [each.name for each in tmp_path.iterdir()] == ["groups"]
+
+
+def test_groups_with_other_births_are_refused(tmp_path: Path) -> None:
+    longer = replace(
+        group_details(1), document=DOCUMENT.replace('"births":8', '"births":9')
+    )
+    for number, details in enumerate([group_details(0), longer]):
+        write_run(tmp_path / f"g{number}", rows([], 1), details)
+    with pytest.raises(RunFolderError, match=r"g1: must have as many births as .*g0; "):
+        join_groups([tmp_path], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_used_folder_is_refused(tmp_path: Path, whole: Path) -> None:
