@@ -14,9 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import count
-from math import log
 
 import numpy as np
+
+from tests.benchmarks.fleet_model import drawn_s
 
 _SEED = 1
 _BROODS = 21
@@ -121,9 +122,8 @@ class ArchipelagoModel:
 
     def _evaluate(self, number: int) -> None:
         self._free -= 1
-        spread = self._setting.spread
-        shift = log(self._setting.evaluation_s) - spread**2 / 2
-        lasts_s = float(self._rng.lognormal(shift, spread))
+        setting = self._setting
+        lasts_s = drawn_s(self._rng, setting.evaluation_s, setting.spread)
         self._at(self._now_s + lasts_s, self._answer, number)
 
     def _answer(self, number: int) -> None:

@@ -185,9 +185,7 @@ class FleetModel:
     def _evaluate(self, name: str, number: int) -> None:
         """Have a worker do a job after its others; the answer arrives later."""
         setting = self._setting
-        # Makes the mean of the distribution equal to the setting.
-        shift = log(setting.evaluation_s) - setting.spread**2 / 2
-        lasts_s = self._rng.lognormal(shift, setting.spread)
+        lasts_s = drawn_s(self._rng, setting.evaluation_s, setting.spread)
         arrival_s = self._now_s + setting.latency_s
         end_s = max(arrival_s, self._workers_end_s[name]) + lasts_s
         self._lasts_s[number], self._workers_end_s[name] = lasts_s, end_s
@@ -200,6 +198,11 @@ class FleetModel:
             begin_s = max(self._now_s, self._coordinator_end_s)
             self._coordinator_end_s = begin_s + self._setting.coordinator_s
             self._at(self._coordinator_end_s, self._tell, returned)
+
+
+def drawn_s(rng: np.random.Generator, mean_s: float, spread: float) -> float:
+    """Return a lognormally distributed duration [s] with a given mean."""
+    return float(rng.lognormal(log(mean_s) - spread**2 / 2, spread))
 
 
 def most_workers(setting: Setting) -> tuple[int, Outcome]:
