@@ -77,11 +77,16 @@ def _submitted(
     run: Run, protocol: Protocol, fleet: Fleet
 ) -> Iterator["Future[Result]"]:
     """Yield the evaluations of a run's best robot in the first and later windows."""
-    (robot,), clock = run.best_ever(), run.experiment.settings["simulation"]
+    (robot,) = run.best_ever()
     for number in range(1 + protocol.later_windows):
-        start = clock["warmup_steps"] + number * clock["window_steps"]
-        later = run.experiment.replace(simulation={"warmup_steps": start})
-        yield fleet.submit(robot, later)
+        yield fleet.submit(robot, in_window(run.experiment, number))
+
+
+def in_window(experiment: Experiment, number: int) -> Experiment:
+    """Return an experiment whose evaluations begin a number of windows later."""
+    clock = experiment.settings["simulation"]
+    start = clock["warmup_steps"] + number * clock["window_steps"]
+    return experiment.replace(simulation={"warmup_steps": start})
 
 
 def _evaluations(run: Run) -> int:

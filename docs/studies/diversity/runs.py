@@ -27,6 +27,7 @@ from analysis.figures.archive_maps import archive_maps, draw_map
 from analysis.measures.load import read_run
 from analysis.measures.study import measure_run
 from docs.studies.pages import DOCS, PICTURES, append_csv, csv_rows
+from revolve.suite.runs import in_window
 
 DATA = DOCS / "data" / "diversity"
 REFERENCE = "scenario1"
@@ -103,12 +104,10 @@ def course_rows(run: rv.Run, births: int) -> list[Row]:
 def best_row(run: rv.Run, given: rv.Experiment) -> Row:
     """Return the fitness of the fittest robot ever in its first and later windows."""
     (robot,) = run.best_ever()
-    steps = given.settings["simulation"]
-    windows = []
-    for number in range(1 + LATER):
-        start = steps["warmup_steps"] + number * steps["window_steps"]
-        later = given.replace(simulation={"warmup_steps": start})
-        windows.append(rv.evaluate(robot, later).fitness or 0.0)
+    windows = [
+        rv.evaluate(robot, in_window(given, number)).fitness or 0.0
+        for number in range(1 + LATER)
+    ]
     return {"first": f"{windows[0]:.6g}", "later": f"{np.mean(windows[1:]):.6g}"}
 
 
