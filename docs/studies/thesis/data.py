@@ -279,10 +279,15 @@ def windows(data: Path, experiment: str) -> Numbers:
 
     Failed evaluations count 0.
     """
-    rows = [row for row in csv_rows(data / WINDOWS) if row["experiment"] == experiment]
-    rows.sort(key=lambda row: int(row["run"]))
     columns = (SELECTED, *LATER_COLUMNS)
+    rows = rows_of(data, experiment)
     return np.array([[float(row[key] or 0.0) for key in columns] for row in rows])
+
+
+def rows_of(data: Path, experiment: str) -> list[dict[str, str]]:
+    """Return an experiment's rows of ``WINDOWS``, by run."""
+    rows = [row for row in csv_rows(data / WINDOWS) if row["experiment"] == experiment]
+    return sorted(rows, key=lambda row: int(row["run"]))
 
 
 def _of_windows(row: dict[str, str]) -> dict[str, float | None]:

@@ -24,7 +24,7 @@ from analysis.comparison.statistics import (
 from analysis.figures.style import in_order, label, scales, theme_of_size
 from analysis.measures.population_table import Numbers
 from docs.studies.pages import Parts, csv_rows, markdown
-from docs.studies.thesis.data import DATA, PARTS, windows
+from docs.studies.thesis.data import DATA, PARTS, WINDOWS, rows_of, windows
 from schema.robot.results import sustained
 
 Tables = Mapping[str, pa.Table]
@@ -49,7 +49,7 @@ _PLANNED = {name: part.repeats for part in PARTS for name in part.names}
 
 def with_rows(data: Path = DATA) -> list[str]:
     """Return the experiments whose best robots were evaluated in windows, in order."""
-    return in_order(row["experiment"] for row in csv_rows(data / "windows/robots.csv"))
+    return in_order(row["experiment"] for row in csv_rows(data / WINDOWS))
 
 
 def late_fitness(experiment: str) -> Numbers:
@@ -74,7 +74,10 @@ def _windows() -> list[str]:
     """Return the median fitness in each window, and who comes out again."""
     names = with_rows()
     found = {name: windows(DATA, name) for name in names}
-    recorded = {name: _recorded(name) for name in names}
+    recorded = {
+        name: np.array([float(row["recorded"]) for row in rows_of(DATA, name)])
+        for name in names
+    }
     heads = ["window", *(f"{label(name)} ({len(found[name])} runs)" for name in names)]
     rows = [
         [
@@ -98,13 +101,6 @@ def _windows() -> list[str]:
     ]
     rows.append(["recorded fitness again (within 5 %)", *counts])
     return markdown(heads, rows)
-
-
-def _recorded(experiment: str) -> Numbers:
-    rows = csv_rows(DATA / "windows/robots.csv")
-    mine = [row for row in rows if row["experiment"] == experiment]
-    mine.sort(key=lambda row: int(row["run"]))
-    return np.array([float(row["recorded"]) for row in mine])
 
 
 def _late() -> list[str]:
