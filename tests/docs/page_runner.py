@@ -97,6 +97,7 @@ def _command(line: str, numbers: dict[str, str]) -> str:
     words = shlex.split(_replaced(line, numbers), comments=True)
     if words[:2] == ["revolve", "run"] and "--workers" not in words:
         words += ["--in-process"]
+    words = with_one_figure(words)
     program = ["-m", "revolve"] if words[0] == "revolve" else []
     done = subprocess.run(
         [sys.executable, *program, *words[1:]],
@@ -108,6 +109,15 @@ def _command(line: str, numbers: dict[str, str]) -> str:
     if (done.returncode != 0) != line.endswith("# fails"):
         raise PageError(f"{line}: exit code {done.returncode}\n{said}")
     return said
+
+
+def with_one_figure(words: list[str]) -> list[str]:
+    """Return a command of a page that draws one figure where the page draws all.
+
+    All take four times as long; test_analyze.py has them.
+    """
+    draws_all = words[:2] == ["revolve", "analyze"] and "--figures" not in words
+    return [*words, "--figures", "6.3"] if draws_all else words
 
 
 def _compare(text: str, output: str) -> None:

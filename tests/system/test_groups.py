@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 import zenoh
@@ -77,19 +76,8 @@ def test_two_groups_have_the_births_of_one_coordinator(workspace: Workspace) -> 
     assert "got those of epoch 1" in told
     assert 0.2 * size(whole) < reached < size(folders[0])
     assert compare(whole, workspace.folder / "two") == []
-    longer_groups_equal_a_longer_run(workspace, folders)
-
-
-def longer_groups_equal_a_longer_run(workspace: Workspace, folders: list[Path]) -> None:
     told = workspace.run("resume", "two", "--workers", "1", "--quiet")
     assert "two: already finished" in told
-    before = [size(folder) for folder in folders]
-    words = ("resume", "two", "--births", "40", "--workers", "1", "--quiet")
-    told = workspace.run(*words)
-    assert "two/group-1: 160 of 160 births" in told
-    assert all(new > old for new, old in zip(map(size, folders), before, strict=True))
-    longer = workspace.finished(RING, 40, "longer")
-    assert compare(longer, workspace.folder / "two") == []
 
 
 def end_of(process: Process) -> str:
