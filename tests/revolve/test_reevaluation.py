@@ -10,7 +10,7 @@ from msgspec.structs import replace
 import revolve as rv
 from coordinator.evolution.generation import random_brain
 from coordinator.evolution.random_streams import Purpose, stream
-from revolve.cli.changes import chosen_robots
+from revolve.cli.winners import chosen_robots
 from revolve.command import main
 from revolve.robot import plain
 from schema.experiment.document import body_space

@@ -2,7 +2,7 @@
 
 import pyarrow as pa
 
-from revolve.cli.changes import _fittest_first
+from revolve.cli.winners import _fittest_first
 from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 from schema.wire.recorded import last_recorded

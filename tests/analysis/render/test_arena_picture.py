@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from analysis.render.arena_picture import ArenaRenderer, Poses
 from analysis.render.overlay import Overlay
 from analysis.render.stage import HIDDEN_M, Stage, furnish
-from analysis.viewer.arena_film import ArenaRenderer, Poses
 from schema.experiment.document import ArenaSection
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of

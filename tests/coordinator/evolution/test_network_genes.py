@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.brains import (
+from coordinator.evolution.brains import brain_rules
+from coordinator.evolution.mutable_genome import to_branches, to_genome
+from coordinator.evolution.network import (
     add_connections,
     add_hidden_neurons,
-    brain_rules,
     delete_connections,
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.mutable_genome import to_branches, to_genome
 from coordinator.evolution.random_streams import BufferedRng
 from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, develop, walk

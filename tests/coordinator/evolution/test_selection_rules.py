@@ -15,7 +15,7 @@ from msgspec import structs
 
 from coordinator.evolution import rules as island_rules
 from coordinator.evolution.breeding import Individual
-from coordinator.evolution.kinds import check_rule as check_rule_of
+from coordinator.evolution.check_rule import check_rule as check_rule_of
 from coordinator.evolution.members import Relatives
 from coordinator.evolution.rules import Rule, select_survivors
 from schema.errors import ExperimentError, UnknownPlugin

@@ -15,7 +15,8 @@ from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from tests.worker.evaluations import with_simulation
 from worker.robot.control_loop import ControlLoop
-from worker.robot.evaluation import EvaluationLoop, combined, disturbances, evaluate
+from worker.robot.disturbances import combined, disturbances
+from worker.robot.evaluation import EvaluationLoop, evaluate
 
 SETTINGS = with_simulation(Simulation(window_steps=400, friction=0.5, drop_m=0.01))
 STILL = Robust(

@@ -20,7 +20,8 @@ from schema.experiment.settings import EvaluationSettings
 from schema.robot.results import Evaluation, sustained
 from schema.robot.robot import Robot
 from tests.worker.evaluations import with_simulation
-from worker.robot.evaluation import disturbances, evaluate, simulate
+from worker.robot.disturbances import disturbances
+from worker.robot.evaluation import evaluate, simulate
 from worker.robot.robustness import (
     ChangedSettings,
     all_changes,
