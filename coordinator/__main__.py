@@ -26,7 +26,6 @@ from coordinator.cli.groups import (
     check_groups,
     execute_groups,
     groups_below,
-    resume_groups,
     start_groups,
 )
 from coordinator.dispatch.events import AgentKind
@@ -51,7 +50,7 @@ from coordinator.storage.campaign import (
     shipped_campaigns,
 )
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import holds_run
+from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
 from schema.agent.address import HUB
@@ -228,7 +227,9 @@ def _resume(options: argparse.Namespace) -> int:
         _refuse_for_groups(options)
     deployment = _deployment(options, experiments, folder)
     if groups:
-        commands = resume_groups(groups)
+        commands = {
+            each: (read_details(each), ["resume", str(each)]) for each in groups
+        }
         go = partial(execute_groups, folder, commands, deployment, main)
         return _stoppable(folder, deployment, go)
     return _stoppable(folder, deployment, lambda: resume(folder, deployment))
@@ -345,7 +346,6 @@ def _deployment(
 def _refuse_flags_of_arenas(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> None:
-    """Raise if a flag is for arenas, of which these experiments have none."""
     names = ", ".join(experiment.name for experiment in experiments)
     for flag in ("speed", "arena-workers"):
         if getattr(options, flag.replace("-", "_")) is not None:

@@ -54,7 +54,6 @@ def _run(connection: Connection) -> int:
 
 
 def _serve(connection: Connection) -> int:
-    """Do tasks one by one."""
     prepare_process()  # before NumPy is imported, as the command does
     from revolve.solo import outcome_of  # noqa: PLC0415
     from schema.agent.stopping import STOPPED  # noqa: PLC0415

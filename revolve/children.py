@@ -128,7 +128,6 @@ def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
 
 
 def _received(connection: Connection) -> bytes | None:
-    """Return the message that an ended process has left."""
     try:
         return connection.recv_bytes() if connection.poll() else None
     except (EOFError, ConnectionError):

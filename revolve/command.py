@@ -71,13 +71,11 @@ def main(
 
 
 def _tell(error: Exception) -> None:
-    """Write a user's error to standard error, as one line."""
     message = import_module("schema.errors").one_line(error)
     import_module("schema.agent.log").tell_error(f"revolve: {message}")
 
 
 def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
-    """Run the command that the words start with and return its exit code."""
     if words[:1] == ["help"]:
         words = [*words[1:], "--help"]
     if not words or words[0] in ("-h", "--help"):
@@ -102,7 +100,6 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
 
 
 def _run_command(words: list[str], tell: Callable[[Exception], None]) -> int:
-    """Run a known command and return its exit code."""
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
     import_module("schema.agent.supervisor").prepare_process()
     error_type = import_module("schema.errors").RevolveError

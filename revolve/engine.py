@@ -159,7 +159,6 @@ class Engine:
         self._open.clear()
 
     def _serve(self, fleet: JobRouter) -> None:
-        """Pass on orders and answers until closed."""
         alone_s = done_s = time.monotonic()
         is_told = False
         while not self._is_closing:
@@ -233,7 +232,6 @@ class Engine:
 
 
 def _all_of(queue: "SimpleQueue[Any]") -> list[Any]:
-    """Remove and return all entries of a queue."""
     entries = []
     with suppress(Empty):
         while True:

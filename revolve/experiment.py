@@ -189,7 +189,6 @@ def _without_none(value: Any) -> Any:  # noqa: ANN401 - any tree of plain values
 
 
 def _toml(value: Any) -> str:  # noqa: ANN401 - any tree of plain values
-    """Return a value in TOML, in one line."""
     if isinstance(value, dict):
         pairs = (f"{_toml(key)} = {_toml(each)}" for key, each in value.items())
         return f"{{{', '.join(pairs)}}}"

@@ -305,7 +305,6 @@ class Fleet:
         return order.future
 
     def _in_order(self, futures: Iterator["Future[T]"]) -> Iterator[T]:
-        """Return results in the order of futures, with some of them ahead."""
         ahead = max(_LEAST_AHEAD, _AHEAD_PER_WORKER * self._count)
         results = _results(deque(islice(futures, ahead)), futures)
         # A generator that has not begun would cancel nothing when it is closed.
@@ -359,7 +358,6 @@ def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
 
 
 def _settle(end: Deliver, settings: EvaluationSettings, robot: PlainRobot) -> Result:
-    """Return the result that the end of an evaluation gives."""
     if end.is_deadly:
         return Result(failure=f"{QUARANTINED}{end.reason}")
     if end.reason:
@@ -395,7 +393,6 @@ def _read_value(data: bytes, *, expected: Expected) -> object:
 
 
 def _value(end: Deliver, *, number: int) -> object:
-    """Return the value that the end of a call gives."""
     if end.reason:
         raise refusal(end)
     if isinstance(end.answer, Failure):

@@ -218,7 +218,6 @@ def plain(robot: object) -> PlainRobot:
 
 
 def _of_numpy(value: object) -> object:
-    """Return an array or a number of NumPy as lists and numbers."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f"must be numbers and texts, got {shown(value)}")

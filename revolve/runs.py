@@ -53,7 +53,6 @@ _OF_ROBOTS = ("island", "birth", "genome", "robot")
 
 
 def _table(name: str) -> property:
-    """Return the property of a run that reads a table."""
     rows = TABLES[name].metadata[b"description"].decode()
     return property(lambda run: run.table(name), doc=f"Each row is {rows}.")
 
@@ -219,7 +218,6 @@ class Run:
         return self._first(best_ever(self.folder), count)
 
     def _first(self, rows: Iterable[Row], count: int) -> list[Robot]:
-        """Return the robots of the first rows, each once."""
         most = whole_number("count", count)
         chosen: dict[BirthId, Row] = {}
         for row in rows:
@@ -418,7 +416,6 @@ def _common(
 
 
 def _done(words: tuple[str, ...], folder: Path, *, progress: bool | None) -> Run:
-    """Run a command; return the run that it has finished."""
     run_command(words, is_quiet=is_silent(progress=progress))
     finished = Run(folder)
     if finished.state != "finished":

@@ -47,7 +47,6 @@ def _done(task: Task) -> Outcome:
 def _picture(
     robot: Robot, settings: EvaluationSettings, size: tuple[int, int]
 ) -> bytes:
-    """Return a picture of a robot in neutral pose, as PNG."""
     with extra("pictures need", "pictures"):
         from PIL import Image  # noqa: PLC0415
 

@@ -18,8 +18,8 @@ from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
 from worker.robot.robustness import (
+    all_changes,
     rejudge,
-    small_changes,
     summary,
     window_changes,
 )
@@ -73,7 +73,8 @@ def _show_robustness(
         print(f"{'undisturbed:':26}{rounded(fitness)}")
     again = partial(_evaluate, trial=trial)
     found: list[list[float | None]] = []
-    for changes in (small_changes(settings), window_changes(settings)):
+    small = [change for change in all_changes(settings) if change.is_small]
+    for changes in (small, window_changes(settings)):
         found.append([])
         for change, changed in rejudge(robot, changes, again):
             print(f"{change.name + ':':26}{_share(changed, fitness)}", flush=True)

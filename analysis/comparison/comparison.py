@@ -109,10 +109,6 @@ class Outcomes:
         runs = (run for name in experiments for run in self.runs[name])
         return list(dict.fromkeys(run.fitness for run in runs))
 
-    def have_one_grid(self, *experiments: str) -> bool:
-        """Return whether the runs of experiments have the same cells, or none."""
-        return len({run.grid for name in experiments for run in self.runs[name]}) == 1
-
     def table(self) -> pa.Table:
         """Return the outcomes of all finished runs, at births that all reach."""
         rows: list[Row] = []
@@ -153,7 +149,8 @@ def comparison(outcomes: Outcomes) -> pa.Table:
         births = outcomes.births(a, b)
         is_alike = len(outcomes.fitness_functions(a, b)) == 1
         unlike = frozenset() if is_alike else OF_FITNESS
-        unlike |= frozenset() if outcomes.have_one_grid(a, b) else OF_GRID
+        grids = {run.grid for run in (*outcomes.runs[a], *outcomes.runs[b])}
+        unlike |= frozenset() if len(grids) == 1 else OF_GRID
         for measure in (*OUTCOME, *outcomes.own_measures(births, a, b)):
             if measure in unlike:
                 continue

@@ -116,7 +116,6 @@ class DrawnFigure:
 def _spread(
     section: Section, number: str, title: str, panels: Panels, note: str = ""
 ) -> Figure:
-    """Return a figure of outcomes; its caption ends with a note."""
     return Figure(
         number,
         title,
@@ -141,7 +140,6 @@ def _course(
 
 
 def _of_cells(number: str, title: str, measure: str, text: str) -> Figure:
-    """Return a figure of a measure that needs cells over measures."""
     figure = _course("diversity", number, title, measure, text)
     source = ("cells", *figure.source)
     return replace(figure, source=source, nothing="no experiment has a [grid]")

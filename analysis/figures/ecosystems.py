@@ -108,7 +108,6 @@ def ground_map(tables: Tables) -> Any:  # noqa: ANN401 - untyped
 
 
 def _first_arenas(tables: Tables, name: str) -> Any:  # noqa: ANN401 - pandas
-    """Return a table's rows of the first arenas, with the name of their panel."""
     arenas = tables["birth_places"].select(["folder", "island"]).to_pandas()
     shown = arenas.drop_duplicates().head(_MOST_ARENAS)
     rows = tables[name].to_pandas().merge(shown, on=["folder", "island"])

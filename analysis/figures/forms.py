@@ -207,7 +207,6 @@ def counted_runs(sizes: Mapping[str, int]) -> str:
 
 
 def _births(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:
-    """Return the births of each experiment's outcomes, empty if they are equal."""
     rows = outcomes.select(["experiment", "births"]).to_pylist()
     known = {row["experiment"]: f"{row['births']} births" for row in rows}
     texts = {name: known[name] for name in experiments}

@@ -61,11 +61,7 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
 
 
 def _of_several(tables: Tables) -> pa.Table:
-    """Return the rows of ``runs`` with several islands.
-
-    Raises:
-        NothingToDraw: there is none.
-    """
+    """Return the rows of ``runs`` with several islands; raise if there is none."""
     several = tables["runs"].filter(pc.field("islands") > 1)
     if not several:
         raise NothingToDraw("no run has several islands")

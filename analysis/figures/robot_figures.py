@@ -22,7 +22,8 @@ from analysis.render.picture import Simulate
 from schema.errors import RevolveError
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
-from schema.tables.learnt import learnt_births
+from schema.tables.files import read_table
+from schema.tables.learnt import with_learnt
 
 TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 """Numbers of the figures of families of the thesis's experiments."""
@@ -66,7 +67,8 @@ def robot_pictures(
         run = runs[best[name].folder]
         try:
             experiment = shown_experiment(run)
-            births = learnt_births(run.folder)
+            tables = (read_table(run.folder, each) for each in ("births", "learning"))
+            births = with_learnt(*tables)
             row = row_of(best[name], births)
             pictures[name] = robot_picture(
                 best[name],

@@ -39,7 +39,6 @@ def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
 
 
 def _files(roots: Iterable[Path]) -> dict[Path, bool]:
-    """Return the files that may be benchmarks, and whether each is a root."""
     files: dict[Path, bool] = {}
     for root in roots:
         if root.is_file():

@@ -58,7 +58,6 @@ def _values(table: pa.Table, births: pa.Table, more: dict[str, object]) -> pa.Ta
 
 
 def _off_line(run: RunTables) -> pa.Table:
-    """Return the values of the judged robots of each population off-line."""
     table, evaluations = run.population_table, run.tables["evaluations"]
     keys = ["island", "robot", "measure"]
     values = _values(evaluations, run.births, {})

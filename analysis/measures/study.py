@@ -162,7 +162,6 @@ def _failures(tables: Mapping[str, pa.Table]) -> int:
 
 
 def _named(table: pa.Table, name: str, run: LoadedRun) -> pa.Table:
-    """Return a table with the columns that name the run, in the types of the output."""
     for column, value in (("experiment", run.experiment), ("folder", str(run.folder))):
         table = table.append_column(column, pa.repeat(value, table.num_rows))
     return table.select(schema(name).names).cast(schema(name))

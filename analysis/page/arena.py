@@ -81,7 +81,6 @@ def arena_page(options: argparse.Namespace) -> int:
 
 
 def _curves(folder: Path, news: Update) -> list[dict[str, Any]]:
-    """Return population and mean fitness over simulated time."""
     changes: Counter[float] = Counter()
     for birth in news.births:
         if birth.sim_time_s is not None:

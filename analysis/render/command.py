@@ -79,7 +79,6 @@ def _ticks_of_gait(count: int, settings: EvaluationSettings) -> tuple[int, int]:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse an ending, and flags that have no meaning for it."""
     out: Path = options.out
     ending = out.suffix.lower()
     if ending not in (PICTURE_ENDING, *FILM_ENDINGS):

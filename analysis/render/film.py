@@ -26,11 +26,6 @@ _BAR = 0.2
 """Greatest length of a scale bar, as a share of a picture's width."""
 
 
-def rods_needed(robots: int, *, has_trail: bool, has_start: bool) -> int:
-    """Return the greatest number of rods of ``way_marks``."""
-    return robots * (_PIECES * has_trail + has_start)
-
-
 def way_marks(
     renderer: RobotRenderer,
     poses: Sequence[Floats],
@@ -120,11 +115,12 @@ class RobotFilm(AbstractContextManager["RobotFilm"]):
         (robot, settings), *others = shown.values()
         robots = [robot, *(one for one, _ in others)] if others else robot
         marks = {"has_trail": options.trail, "has_start": options.start_mark}
+        rods = len(shown) * (_PIECES * options.trail + options.start_mark)
         is_clear = options.background == TRANSPARENT
         self._renderers = [
             RobotRenderer(
                 robots, settings, size=options.size, background=page,
-                rods=rods_needed(len(shown), **marks), is_fine=is_fine,
+                rods=rods, is_fine=is_fine,
             )
             for page in (_PAGES if is_clear else (options.background,))
         ]  # fmt: skip

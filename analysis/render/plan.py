@@ -56,12 +56,7 @@ def _colour(kind: PartType, shape: Shape) -> str:
 
 
 def _outline(middle: Floats, edges: Floats) -> Floats:
-    """Return the outline of a box seen from above, (6, 2), anticlockwise.
-
-    Args:
-        middle: (2,) of the box.
-        edges: (3, 2) its edges.
-    """
+    """Return the outline of a box seen from above, (6, 2); its edges are (3, 2)."""
     is_down = (edges[:, 1] < 0) | ((edges[:, 1] == 0) & (edges[:, 0] < 0))
     edges = np.where(is_down[:, np.newaxis], -edges, edges)
     # Around a box seen from above each of its edges is met twice, by direction.

@@ -219,7 +219,6 @@ def _equal(rows: Sequence[Row]) -> str:
 
 
 def _meanings(measures: Collection[str]) -> str:
-    """Return a table of the meanings of measures, in the order of ``OUTCOME``."""
     named = [name for name in OUTCOME if name in measures]
     named += sorted(set(measures) - set(named))
     rows = [[cell(_words(name)), cell(meaning(name))] for name in named]

@@ -110,7 +110,6 @@ def _add_dots(
     robots: Sequence[Row],
     run: tuple[RunName, str],
 ) -> None:
-    """Add the robots of a run, of a name and colour, at their places, x and fitness."""
     if not places:
         return
     gid, (name, colour) = f"dots-{len(texts)}", run

@@ -31,7 +31,6 @@ def comparison_latex(comparison: pa.Table) -> str:
 
 
 def _tabular(rows: list[Row]) -> str:
-    """Return the rows of one pair of experiments as a ``tabular``."""
     first = rows[0]
     a, b = (_text(f"{first[name]} ({first[f'runs_{name}']})") for name in "ab")
     lines = [

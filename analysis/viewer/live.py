@@ -20,11 +20,9 @@ from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
 from schema.agent.service import HubWatch, open_session, why_no_hub
 from schema.agent.topics import (
     Member,
-    agents_alive,
     check_name,
+    key_of_all,
     member_of,
-    news_of_all,
-    poses_of_all,
 )
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import LIVE_BYTES, MIB, UPDATE_BYTES
@@ -140,10 +138,14 @@ class LiveSource:
                 raise NetworkError(why_no_hub(self._connect, self._hub.tls)) from None
             put = zenoh.handlers.Callback(self._take, indirect=False)
             token = zenoh.handlers.Callback(self._take_token, indirect=False)
-            tokens = agents_alive(self._fleet, "coordinator")
+            tokens = key_of_all(self._fleet, "coordinator", "alive")
             self._declared = [
-                self._session.declare_subscriber(poses_of_all(self._fleet), put),
-                self._session.declare_subscriber(news_of_all(self._fleet), put),
+                self._session.declare_subscriber(
+                    key_of_all(self._fleet, "worker", "arena/*/pose"), put
+                ),
+                self._session.declare_subscriber(
+                    key_of_all(self._fleet, "coordinator", "events"), put
+                ),
                 self._session.liveliness().declare_subscriber(
                     tokens, token, history=True
                 ),

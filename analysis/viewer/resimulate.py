@@ -95,7 +95,6 @@ def resimulate(
 def _alone(
     run: LoadedRun, own: Experiment, birth: BirthId, simulators: Simulators
 ) -> Motion:
-    """Return the motion of a robot alone on its island, in its fittest evaluation."""
     rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {birth.name}: no evaluation is recorded")

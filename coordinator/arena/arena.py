@@ -213,7 +213,6 @@ class Arena:
         return True
 
     def _advanced(self, event: Advanced) -> list[ArenaCommand]:
-        """Record the result of an advance, and decide."""
         if not self._is_awaited(event):
             return []
         advance = event.advance
@@ -296,7 +295,6 @@ class Arena:
         return self.is_extinct or is_late or self.births >= self.experiment.births
 
     def _bear(self) -> list[Record | Ask]:
-        """Insert the children of the last decision."""
         commands: list[Record | Ask] = []
         for mating, child, outcome in self._breeding_queue.take_children():
             if child is not None:
@@ -305,7 +303,6 @@ class Arena:
         return commands
 
     def _conclude(self) -> list[ArenaCommand]:
-        """Carry out orders, and advance unless paused."""
         commands: list[ArenaCommand] = []
         orders = self._orders
         if orders.pending:
@@ -358,7 +355,7 @@ class Arena:
         if self._infancy is not None:
             until = self._infancy.next_end(until)
         changes = replace(self.living.take_changes(), lights=self._rules.lights)
-        is_saved = clock.is_snapshot_due(step, until)
+        is_saved = until // clock.snapshot > step // clock.snapshot
         self._awaited = AdvanceShard(
             self._number,
             self._advances,
@@ -426,7 +423,3 @@ class ArenaClock:
         later = (self.birth, self.cull, self.sample)
         intervals = (self.founder,) if is_founding else later
         return min((step // each + 1) * each for each in intervals)
-
-    def is_snapshot_due(self, step: int, until: int) -> bool:
-        """Return whether a snapshot is due between two steps."""
-        return until // self.snapshot > step // self.snapshot

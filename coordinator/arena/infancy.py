@@ -160,7 +160,6 @@ class Infancy:
     def _judge(
         self, birth: BirthId, event: Advanced, moment: Moment
     ) -> Sequence[Ask | Record]:
-        """End a trial with the fitness of its window."""
         infant, judgement = self._infants[birth], self._found(birth).judgement
         assert judgement is not None
         assert infant.trial is not None

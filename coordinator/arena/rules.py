@@ -169,7 +169,6 @@ def _plain(value: Any) -> object:  # noqa: ANN401 - a mapping, or of NumPy
 
 
 def _problems(decisions: Decisions, view: ArenaView, known: Stores) -> Iterator[str]:
-    """Yield what cannot be."""
     living = {robot.birth for robot in view.robots}
     dying = [death.birth for death in decisions.deaths]
     if len(set(dying)) < len(dying):

@@ -97,7 +97,6 @@ def send(
 
 
 def _listed(arena: ArenaListing, options: argparse.Namespace) -> str:
-    """Return the living robots of an arena as lines, or as a JSON document."""
     if options.json:
         document = {
             "version": 1,

@@ -138,25 +138,22 @@ def finished_code(folder: Path, groups: Sequence[Path] = ()) -> int | None:
             Revolve Islands began a run that is to be continued.
     """
     if groups:
-        if any(_is_to_be_rewritten(one) or not _is_finished(one) for one in groups):
-            return None
+        for one in groups:
+            if _is_to_be_rewritten(one) or read_state(one) != "finished":
+                return None
         tell_user(f"{folder}: already finished")
         return 0 if any(map(has_evaluated, groups)) else 1
     if is_campaign(folder) or not holds_run(folder):
         return None
     if read_description(folder).group.of > 1:
         return None
-    if _is_to_be_rewritten(folder) or not _is_finished(folder):
+    if _is_to_be_rewritten(folder) or read_state(folder) != "finished":
         # Before its plug-ins are looked at.
         refuse_other_version(folder)
         return None
     tell_user(f"{folder}: already finished")
     restore_best(folder)
     return 0 if has_evaluated(folder) else 1
-
-
-def _is_finished(folder: Path) -> bool:
-    return read_state(folder) == "finished"
 
 
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
@@ -170,7 +167,7 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
                 folder,
                 [Planned(status, lambda: held)],
                 deployment,
-                lambda run: conclusions.append(_concluded(run)),
+                lambda run: conclusions.append(conclude(run.held.path, run.experiment)),
                 lambda _status, _error: None,  # raised below
             )
         except NetworkError:
@@ -270,7 +267,7 @@ def _execute_campaign(
         tell_user(f"{finished} of {counted(len(planned), 'run')} already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = _concluded(run)
+        conclusion = conclude(run.held.path, run.experiment)
         if conclusion.failures:
             warn_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
@@ -302,10 +299,6 @@ def _execute_campaign(
     runs = counted(len(planned), "run")
     print(f"{runs} finished\ntry next:\n  {command('analyze', folder)}")
     return 1 if failed else 0
-
-
-def _concluded(run: RunSession) -> Conclusion:
-    return conclude(run.held.path, run.experiment)
 
 
 def _report(status: RunStatus, error: RevolveError) -> None:

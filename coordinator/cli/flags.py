@@ -141,7 +141,6 @@ def _group(text: str) -> Group:
 
 
 def _add_group(flags: argparse.ArgumentParser) -> None:
-    """Add the flags of a coordinator that runs a part of an archipelago."""
     flags.add_argument(
         "--group",
         type=_group,
@@ -169,7 +168,6 @@ def _host_and_port(text: str) -> tuple[str, int]:
 
 
 def _add_experiments(flags: argparse.ArgumentParser) -> None:
-    """Add the flags that determine the births."""
     names = ", ".join([*shipped_experiments(), *shipped_campaigns()])
     flags.add_argument(
         "experiments",

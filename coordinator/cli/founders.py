@@ -166,7 +166,6 @@ def _difference(robot: Robot, stored: bytes | None, others: dict[str, str]) -> s
 
 
 def _births(folder: Path, given: Founders, most: int) -> Iterator[tuple[BirthId, Row]]:
-    """Yield the births of a run that are founders, in order, with their rows."""
     if isinstance(given.population, str):
         rows = best_ever(folder)
         if given.population == "last":

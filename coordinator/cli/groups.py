@@ -126,11 +126,6 @@ def start_groups(
     return commands
 
 
-def resume_groups(groups: Sequence[Path]) -> Commands:
-    """Return the commands that continue groups."""
-    return {path: (read_details(path), ["resume", str(path)]) for path in groups}
-
-
 def execute_groups(
     folder: Path, commands: Commands, deployment: Deployment, main: Main
 ) -> int:
@@ -207,7 +202,6 @@ def _flags(deployment: Deployment, address: str) -> list[str]:
 
 
 def _start(main: Main, words: list[str]) -> SpawnProcess:
-    """Start the coordinator of a group."""
     process = get_context("spawn").Process(target=_coordinate, args=(main, words))
     start_without_ctrl_c(process)
     return process

@@ -105,7 +105,6 @@ def _events(path: Path, *, is_followed: bool) -> Iterator[tuple[int, JournalledE
 
 
 def _read(path: Path, start: int, *, is_followed: bool) -> bytes:
-    """Return the bytes of a journal from ``start`` on."""
     try:
         with path.open("rb") as file:
             if is_empty(path, file.read(len(MAGIC))):

@@ -179,7 +179,6 @@ def _advance(event: Advanced) -> Fields:
 
 
 def _robots(event: Advanced, selection: EventFilter) -> list[Fields]:
-    """Return the fields of the selected robots of an advance."""
     advance = event.advance
     robots: tuple[Judgement | Casualty, ...] = advance.judgements + advance.casualties
     progress = {"advance": event.number, "step": advance.step}

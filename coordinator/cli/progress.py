@@ -104,7 +104,6 @@ class Display:
         return self._scheduler.active if self._scheduler else []
 
     def _recoveries(self) -> list[str]:
-        """Describe the runs whose lost poses are computed again."""
         return [
             "recomputing poses of {}: advance {} of {}".format(
                 run.held.path.name, *run.recovery.progress
@@ -168,7 +167,6 @@ def _waiting(run: RunSession, missing: Sequence[str]) -> Iterator[str]:
 
 
 def _line(status: Status) -> str:
-    """Return the state as one line of a log."""
     line = f"{births_done(status)}, {pace(status)}, {time_left(status)}"
     if len(status.runs) == 1:
         return f"{line}{about_arenas(status.runs[0])}"

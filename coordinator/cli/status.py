@@ -22,7 +22,7 @@ from coordinator.cli.status_text import (
     trouble_lines,
     waiting_text,
 )
-from coordinator.network.client_service import ask_coordinators
+from coordinator.network.client_service import asking
 from coordinator.storage.campaign import is_campaign
 from coordinator.storage.folder import holds_run
 from coordinator.storage.folder_status import status_below
@@ -108,21 +108,14 @@ def ask(
     Raises:
         NetworkError: no coordinator answers.
     """
-    replies = ask_coordinators(
-        encode(request),
-        connect=connect_of(options),
-        fleet=options.fleet,
-        tls=tls_of(options),
-        only=only,
-    )
+    hub, tls = connect_of(options), tls_of(options)
+    with asking(hub, fleet=options.fleet, tls=tls, only=only) as replies_to:
+        replies = replies_to(encode(request))
     return {name: decode_operator_reply(data) for name, data in replies.items()}
 
 
 def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | None:
-    """Return name and status of a folder's coordinator; None if none is running.
-
-    Those of groups of islands are joined.
-    """
+    """Return name and status of a folder's coordinators, joined; None without any."""
     try:
         options.connect = read_address(folder)
         statuses = ask_status(options)

@@ -102,13 +102,6 @@ def waiting_text(missing: Sequence[str]) -> str:
     return f"waiting for {' and '.join(missing)}"
 
 
-def state_of(run: RunStatus, status: Status, *, is_live: bool) -> str:
-    """Return the state of a run for a table."""
-    missing = missing_agents(status)
-    is_waiting = is_live and missing and run.state == "running"
-    return waiting_text(missing) if is_waiting else run.state
-
-
 def part_lines(status: Status) -> list[str]:
     """Return a line for each arena that several workers advance."""
     lines = []
@@ -199,9 +192,11 @@ _COLUMNS: dict[str, Cells] = {
 
 def run_table(status: Status, name_of: Cells, *, is_live: bool) -> Table:
     """Return a table of runs without the columns that are empty in all rows."""
+    missing = missing_agents(status) if is_live else []
+    waits = {"running": waiting_text(missing)} if missing else {}
     columns: dict[str, Cells] = {
         "run": name_of,
-        "state": lambda run: state_of(run, status, is_live=is_live),
+        "state": lambda run: waits.get(run.state, run.state),
         **_COLUMNS,
     }
     cells = {head: [*map(text, status.runs)] for head, text in columns.items()}

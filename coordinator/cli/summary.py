@@ -263,7 +263,6 @@ def _failures(folder: Path) -> str:
 
 
 def _most_frequent(reasons: pa.ChunkedArray) -> str:
-    """Return the most frequent of some reasons and its count."""
     ((reason, count),) = Counter(reasons.to_pylist()).most_common(1)
     share = "all" if count == len(reasons) else f"{count} of them"
     return f"{share}: {reason}"

@@ -77,7 +77,6 @@ def _init(folder: Path, options: argparse.Namespace) -> None:
 
 
 def _list(kit: Kit) -> None:
-    """Print one line for each certificate."""
     now = utc_now()
     print(f"hub at {kit.cluster.address}")
     width = max(len(member.name) for member in kit.cluster.members)

@@ -201,7 +201,6 @@ class Kit:
         return "\n".join((*lines, ""))
 
     def _write(self) -> None:
-        """Write the lists of all and of accepted certificates."""
         access = [
             Certificate(member.name, member.role)
             for member in self.cluster.members
@@ -215,7 +214,6 @@ class Kit:
 
     @staticmethod
     def _authority_of(folder: Path) -> tuple[Path, Path]:
-        """Return the files of the authority: certificate and key."""
         return folder / "ca.pem", folder / "ca.key"
 
 

@@ -290,7 +290,6 @@ class Assignment:
                 return
 
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
-        """Assign a job to an agent."""
         job = pending.job
         self._pairs.note(job, name)
         agent = pool.agents[name]

@@ -32,7 +32,6 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.faults import FaultKind, PeerFaults
-from coordinator.dispatch.homes import Homes
 from coordinator.dispatch.pool import longer_s
 from schema.errors import MalformedMessage, RunFolderError
 from schema.wire.codec import fingerprint
@@ -107,16 +106,6 @@ class JobRouter:
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
         self._ends: dict[Client, list[Deliver]] = {}
 
-    @property
-    def open(self) -> int:
-        """How many jobs and advances are requested and not done."""
-        return self.dispatch.pending
-
-    @property
-    def homes(self) -> Homes:
-        """The workers of arena shards; their numbers are unique in this process."""
-        return self.dispatch.homes
-
     def new_number(self) -> int:
         """Return a number for a job."""
         return next(self._numbers)
@@ -170,7 +159,7 @@ class JobRouter:
             timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         self.tell(Ticked(now_s))
         # Waking up for each answer would cost more than the answers themselves.
-        pause_s = 0.0 if self.homes.are_busy else self.dispatch.pause_s
+        pause_s = 0.0 if self.dispatch.homes.are_busy else self.dispatch.pause_s
         for event in self._agents.receive(timeout_s, min(timeout_s, pause_s)):
             self.tell(event)
         ends, self._ends = self._ends, {}
@@ -254,7 +243,6 @@ class JobRouter:
         return fenced
 
     def _handle(self, event: DispatchEvent) -> None:
-        """Handle an event, and carry out what follows from it."""
         for command in self.dispatch.handle(event):
             match command:
                 case Assign():
@@ -285,7 +273,6 @@ class JobRouter:
 
 
 def _line(command: Crowded | Overdue) -> str:
-    """Return what the user is told."""
     if isinstance(command, Crowded):
         return (
             f"the workers keep {command.kept} arenas and have {command.shards}: those "

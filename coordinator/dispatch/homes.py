@@ -215,7 +215,6 @@ class Homes:
         return sorted(self._workers.fit(home.client))
 
     def _equal(self, home: Home) -> list[str]:
-        """Return the workers of a shard's platform, by name."""
         agents = self._workers.agents
         return [
             name

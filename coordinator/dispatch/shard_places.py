@@ -28,7 +28,7 @@ class ShardPlaces:
         """Platforms of the shards that wait for a worker; "" is any platform."""
         return {
             self._places[number][0]: platform
-            for number, platform in self._fleet.homes.waiting.items()
+            for number, platform in self._fleet.dispatch.homes.waiting.items()
             if number in self._places
         }
 
@@ -47,13 +47,13 @@ class ShardPlaces:
 
     def able(self, shard: int) -> int:
         """Return how many workers may hold a shard that has been advanced, or 0."""
-        number, homes = self._numbers.get((shard, 0)), self._fleet.homes
+        number, homes = self._numbers.get((shard, 0)), self._fleet.dispatch.homes
         return 0 if number is None else len(homes.fit(homes.of(number)))
 
     def holder(self, place: Place) -> str:
         """Return the name of the worker that holds a place; empty if none does."""
         number = self._numbers.get(place)
-        return "" if number is None else self._fleet.homes.holder(number)
+        return "" if number is None else self._fleet.dispatch.homes.holder(number)
 
     def holders(self, shard: int) -> list[str]:
         """Return the names of the workers that hold the parts of a shard."""

@@ -229,19 +229,13 @@ class Breeder:
         return Candidate(birth, attempt, couple, *made, origin=origin)
 
     def _founder(self, birth: BirthId) -> Founder | None:
-        """Return the given founder of a birth, if there is one."""
         founders = self._founders
         return founders[birth.number] if birth.number < len(founders) else None
 
     def _check_attempts(
         self, attempts: int, population: Sequence[Individual], why: str
     ) -> None:
-        """Raise if too many attempts at a birth have failed.
-
-        Raises:
-            ExperimentError: the experiment's limit for random robots is reached, or
-                a hundred couples failed.
-        """
+        """Raise ``ExperimentError`` if too many attempts at a birth have failed."""
         if self._is_random(population):
             limit, what = self._experiment.generation.max_tries, "generation.max_tries"
         else:

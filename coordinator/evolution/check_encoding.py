@@ -138,7 +138,6 @@ def check_brain_genes(experiment: Experiment) -> None:
 
 
 def _check_types(node: Node) -> None:
-    """Raise unless a node has genes of the right types."""
     for name, kind in (
         ("outputs", NeuronGene),
         ("hidden", NeuronGene),

@@ -61,8 +61,6 @@ def _examples(encoding: IslandEncoding, labels: Labels) -> list[Individual]:
 def _populations(
     least: int, examples: Sequence[Individual], island: int
 ) -> list[list[Individual]]:
-    """Return populations: small, of equals, varied, in part without fitness."""
-
     def born(one: Individual, fitness: float) -> Individual:
         number = one.birth.number
         parents = (BirthId(island, number // 2), BirthId(island, number // 3))

@@ -222,7 +222,6 @@ class _CheckedCode:
             self._own = "brain.type", type(encoding), experiment.brain.type
 
     def _named(self) -> AbstractContextManager[None]:
-        """Return a context that names the own code that raises."""
         key, plugin, path = self._own
         return naming_plugin(key, plugin, path) if ":" in path else nullcontext()
 

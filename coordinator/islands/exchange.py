@@ -156,7 +156,6 @@ class GroupExchange:
         return requests
 
     def _needed(self) -> dict[int, list[Needed]]:
-        """Return what the islands need of each group."""
         needed: dict[int, list[Needed]] = {}
         for target, island in sorted(self._islands.items()):
             if island.epochs is None or island.is_finished:

@@ -309,7 +309,6 @@ class Island:
         return [*commands, *self._open_brood()]
 
     def _open_brood(self) -> list[IslandCommand]:
-        """Record the population and open the next brood, or finish."""
         commands: list[IslandCommand] = []
         fitness = [(one.birth, one.known_fitness) for one in self.population]
         commands += population_records(self._number, self.births, fitness)

@@ -38,8 +38,8 @@ def connections(
 
 
 def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
-    """Return the edges of an undirected graph, each once."""
     # A large package that only archipelagos need.
+    """Return the edges of an undirected graph, each once."""
     import networkx as nx  # noqa: PLC0415
 
     # The most square grid.

@@ -12,9 +12,9 @@ from uuid import uuid4
 import zenoh
 
 from schema.agent.address import UNIX, parse_address
-from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
+from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
 from schema.agent.service import open_session, usable, why_no_hub
-from schema.agent.topics import Member, Role, agents_alive, check_name, member_of
+from schema.agent.topics import Member, Role, check_name, key_of_all, member_of
 from schema.errors import MalformedMessage, NetworkError
 from schema.wire.codec import encode
 from schema.wire.operator import (
@@ -28,34 +28,17 @@ _NOW = zenoh.ConsolidationMode.NONE
 _MOST_COORDINATORS = 1000
 
 
-def ask_coordinators(
-    data: bytes,
-    *,
-    connect: str,
-    fleet: str = DEFAULT_FLEET,
-    tls: Tls | None = None,
-    only: str = "",
-) -> dict[str, bytes]:
-    """Return the replies of the coordinators at an address, by name.
-
-    ``data``: an encoded ``OperatorRequest``. ``only``: name of the coordinator to
-    query; empty queries all.
-
-    Raises:
-        NetworkError: no hub, or no coordinator replies.
-    """
-    with asking(connect, fleet=fleet, tls=tls, only=only) as ask:
-        return ask(data)
-
-
 @contextmanager
 def asking(
-    connect: str, *, fleet: str = DEFAULT_FLEET, tls: Tls | None = None, only: str = ""
+    connect: str, *, fleet: str, tls: Tls | None, only: str = ""
 ) -> Iterator[Callable[[bytes], dict[str, bytes]]]:
-    """Yield ``ask_coordinators`` of an address, which keeps one session.
+    """Yield what returns the replies of the coordinators at an address, by name.
+
+    It takes an encoded ``OperatorRequest``; ``only`` is the name of the coordinator to
+    query, empty queries all.
 
     Raises:
-        NetworkError: no hub.
+        NetworkError: no hub; when it is called, no coordinator replies.
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
@@ -96,7 +79,7 @@ def coordinators(
             keys.append(str(reply.ok.key_expr))
 
     session.liveliness().get(
-        agents_alive(fleet, "coordinator"),
+        key_of_all(fleet, "coordinator", "alive"),
         zenoh.handlers.Callback(take, is_done.set, indirect=False),
         timeout=timeout_s,
     )

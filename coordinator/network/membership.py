@@ -217,7 +217,6 @@ class InfoQueue:
         self._schedule()
 
     def _schedule(self) -> None:
-        """Set when the next agent is to be asked."""
         waits_s = 0.0 if self._new else self._again[0][0] if self._again else inf
         self.due_s = max(self._pause_until_s, waits_s)
 

@@ -12,7 +12,7 @@ import zenoh
 
 from coordinator.network.client_service import is_from
 from coordinator.network.operator_service import OperatorQuery
-from schema.agent.topics import Member, announced_by_all, member_of, migrants_of_all
+from schema.agent.topics import Member, key_of_all, member_of
 from schema.errors import MalformedMessage
 from schema.limits import MIGRANTS_REQUEST_BYTES, MOST_PEERS, MOST_QUERIES
 from schema.wire.codec import encode
@@ -69,7 +69,8 @@ class MigrationService:
                 complete=True,
             ),
             session.declare_subscriber(
-                announced_by_all(me.fleet), self._enqueue(lambda data, _sample: data)
+                key_of_all(me.fleet, "coordinator", "announced"),
+                self._enqueue(lambda data, _sample: data),
             ),
         )
 
@@ -109,7 +110,7 @@ class MigrationService:
             self._wake()
 
         self._session.get(
-            migrants_of_all(self._me.fleet),
+            key_of_all(self._me.fleet, "coordinator", "migrants"),
             zenoh.handlers.Callback(sent.take, end, indirect=False),
             payload=encode(request),
             timeout=WAIT_S,

@@ -46,7 +46,7 @@ from schema.agent.service import (
     session_config,
     why_no_hub,
 )
-from schema.agent.topics import Member, agents_alive, check_name
+from schema.agent.topics import Member, check_name, key_of_all
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     BUNDLE_BYTES,
@@ -259,7 +259,7 @@ class Network:
         put = zenoh.handlers.Callback(self._inbox.put, indirect=False)
         self._watches = [
             self._session.liveliness().declare_subscriber(
-                agents_alive(self._me.fleet, kind), put, history=True
+                key_of_all(self._me.fleet, kind, "alive"), put, history=True
             )
             for kind in _KINDS
         ]
@@ -281,7 +281,6 @@ class Network:
         )
 
     def _free_address(self) -> str:
-        """Return the address with the port that the hub has chosen."""
         key = f"@/{self._session.zid()}/router"
         for reply in self._session.get(key, consolidation=_NOW):
             if reply.ok is not None:

@@ -268,7 +268,6 @@ def _check_document(
 
 
 def _is_folder(folder: Path) -> bool:
-    """Return whether a path is the folder of a run or campaign."""
     return is_campaign(folder) or holds_run(folder)
 
 

@@ -83,7 +83,6 @@ class GroupLink:
             service.ask(request)
 
     def _take(self, sent: SentRequest) -> None:
-        """Take the replies to a request."""
         replies: list[tuple[str, MigrantsReply]] = []
         faults: list[tuple[str, str]] = []
         for name, data in sent.replies:
@@ -97,7 +96,6 @@ class GroupLink:
         self._loop.take(events)
 
     def _answer(self, query: OperatorQuery) -> None:
-        """Answer another coordinator, if it asks this group."""
         replies: list[bytes] = []
         try:
             request = decode(MigrantsRequest, query.data, MIGRANTS_REQUEST_BYTES)

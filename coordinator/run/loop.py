@@ -246,7 +246,7 @@ class Loop:
             assert self.rows is not None
             for event in events:
                 if isinstance(event, Advanced) and event.pose_rows:
-                    self.rows.store(event)
+                    self.rows.poses.store(event)
             self.log.append(events)
             answers: list[Asked] = []
             for request in chain.from_iterable(map(self._act_on, events)):
@@ -260,7 +260,6 @@ class Loop:
             events = answers
 
     def _act_on(self, event: JournalledEvent) -> list[Request]:
-        """Act on an event that the journal holds; return the requests to send."""
         if isinstance(event, Served):
             self.outbox.served.add(event.group)
             return []
@@ -321,7 +320,7 @@ class Loop:
                     case Record():
                         self._write(command)
                     case Append(advanced) if self.rows is not None:
-                        self.rows.append(advanced)
+                        self.rows.poses.take_advance(advanced)
                     case Breed() | Evaluate() | AdvanceShard() | Ask():
                         requests.append(command)
                     case Emigrate():
@@ -348,11 +347,6 @@ class Loop:
     def _handled(
         self, number: int, event: Event
     ) -> Iterable[IslandCommand | ArenaCommand]:
-        """Return the commands of an island for an event.
-
-        Raises:
-            UnexpectedEvent: no island takes such an event.
-        """
         machine = self.islands.get(number)
         if isinstance(machine, Arena):
             if isinstance(event, Advanced) and (

@@ -152,10 +152,6 @@ def _check_robot(robot: Robot, arena: Arena) -> None:
 
     Orders in the journal are not checked for the limits of ``[space]``: earlier
     versions accepted them.
-
-    Raises:
-        InvalidRobot: other part types or another brain than the experiment's.
-        Refused: a limit of ``[space]``.
     """
     encoding = arena.encoding
     encoding.check(robot)
@@ -177,7 +173,6 @@ def _check_place(place: tuple[float, float] | None, experiment: Experiment) -> N
 
 
 def _listing(arena: Arena) -> ArenaListing:
-    """Return the living robots of an arena."""
     return ArenaListing(
         arena.clock.seconds(arena.step),
         arena.is_paused,
@@ -215,11 +210,7 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
 
 
 def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorReply:
-    """Return the reply of a run; a run that fails here is stopped.
-
-    Raises:
-        Refused: as for ``_run``, or the run recovers poses or has failed.
-    """
+    """Return the reply of a run; a run that fails here is stopped."""
     run = _run(request.run, scheduler)
     if run.recovery is not None:
         done, total = run.recovery.progress

@@ -72,7 +72,7 @@ class PoseRecovery:
         self._requests = ShardRequests(context, snapshots, fleet)
         self._arenas: dict[int, _Arena] = {}
         if self._order:
-            recorder.poses.keep(_rows(events) - sum(e.pose_rows for e in self._order))
+            recorder.poses.keep(pose_rows(events) - pose_rows(self._order))
             self._plan(_advances(details, events))
         self._total = sum(len(arena.left) for arena in self._arenas.values())
 
@@ -161,15 +161,8 @@ class PoseRecovery:
             self._order.popleft()
 
 
-def has_lost_poses(events: Iterable[JournalledEvent], stored: int) -> bool:
-    """Return whether rows of poses are missing.
-
-    ``stored``: number of rows on disk.
-    """
-    return stored < _rows(events)
-
-
-def _rows(events: Iterable[JournalledEvent]) -> int:
+def pose_rows(events: Iterable[JournalledEvent]) -> int:
+    """Return the number of rows of poses that a journal counts."""
     return sum(each.pose_rows for each in events if isinstance(each, Advanced))
 
 
@@ -186,11 +179,6 @@ def _lost(events: Iterable[JournalledEvent], stored: int) -> Iterator[Advanced]:
 def _advances(
     details: RunDetails, events: Iterable[JournalledEvent]
 ) -> dict[int, list[tuple[AdvanceShard, Advanced]]]:
-    """Return all advances of each arena: the command, and its result in the journal.
-
-    Raises:
-        UnexpectedEvent: the journal of another kind of run.
-    """
     advances: dict[int, list[tuple[AdvanceShard, Advanced]]] = defaultdict(list)
     loop = begun_loop(details)
     for event in events:

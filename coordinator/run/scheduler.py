@@ -125,7 +125,7 @@ class RunScheduler:
     def _has_room(self) -> bool:
         if not self._places:
             return True
-        is_full = self.fleet.open >= SLACK * self.fleet.dispatch.credits
+        is_full = self.fleet.dispatch.pending >= SLACK * self.fleet.dispatch.credits
         return not is_full and len(self._places) < self.most
 
     def _begin(self, place: int, planned: Planned) -> None:
@@ -210,12 +210,9 @@ class RunScheduler:
 
 
 def _queues(fleet: JobRouter) -> tuple[Queue, ...]:
-    """Return how many requests of each kind wait, and how many agents have."""
-    jobs = (
-        Queue(kind, fleet.dispatch.waiting(kind), fleet.dispatch.assigned(kind))
-        for kind in KINDS
-    )
-    return (*jobs, Queue("arena", fleet.homes.unassigned, fleet.homes.assigned))
+    its, homes = fleet.dispatch, fleet.dispatch.homes
+    jobs = (Queue(kind, its.waiting(kind), its.assigned(kind)) for kind in KINDS)
+    return (*jobs, Queue("arena", homes.unassigned, homes.assigned))
 
 
 def _cause(run: RunSession, error: RevolveError) -> RevolveError:

@@ -19,7 +19,7 @@ from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.feed import Feed
 from coordinator.run.group_link import GroupLink
 from coordinator.run.loop import Loop
-from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
+from coordinator.run.pose_recovery import PoseRecovery, pose_rows
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import RunFolder
@@ -159,14 +159,13 @@ class RunSession:
             RevolveError: the run cannot continue; see ``Loop.start``.
         """
         self._events = self._journal.replay()
-        if has_lost_poses(self._events, self._recorder.poses.stored):
+        if self._recorder.poses.stored < pose_rows(self._events):
             self._recover()
         else:
             self.loop.start(self._replay())
         self.held.set_state("running")
 
     def _recover(self) -> None:
-        """Start the recovery of lost poses."""
         self.recovery = PoseRecovery(
             self.held.details,
             self._context,
@@ -198,12 +197,7 @@ class RunSession:
             self.link.act(now_s)
 
     def _go_on_recovering(self, ends: Iterable[Deliver]) -> None:
-        """Continue the recovery of lost poses; when it is done, start the loop.
-
-        Raises:
-            RevolveError: the run cannot continue; see ``PoseRecovery.act`` and
-                ``Loop.start``.
-        """
+        """Continue the recovery of lost poses; when it is done, start the loop."""
         assert self.recovery is not None
         self.held.confirm()
         self.recovery.act(ends)
@@ -355,7 +349,6 @@ def check_journal(folder: Path) -> None:
 
 
 def _runs_row(held: RunFolder) -> Record:
-    """Return the one row of the runs table."""
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = VERSION

@@ -98,11 +98,7 @@ def with_tracks(advance: Advance, poses: PoseArrays) -> Advance:
 
 
 def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:
-    """Raise unless an advance has a past result.
-
-    Raises:
-        MalformedMessage: another digest or number of poses.
-    """
+    """Raise ``MalformedMessage`` unless an advance has a past result."""
     got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
     if got != must:
         raise MalformedMessage(
@@ -162,11 +158,7 @@ def read_part(
 
 
 def _check_places(advance: Advance, boxes: Mapping[BirthId, Box]) -> None:
-    """Raise unless robots are where they say that they went.
-
-    Raises:
-        MalformedMessage: one is outside of its box.
-    """
+    """Raise ``MalformedMessage`` if a robot is outside of its box."""
     poses = PoseArrays.received(advance.poses)
     swept = np.array([boxes[birth] for birth in poses.robots]).reshape(-1, 4)
     places = poses.cores[:, :2]

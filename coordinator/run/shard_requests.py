@@ -227,7 +227,6 @@ class ShardRequests:
         return not past.undivided
 
     def _send_parts(self, shard: int, parts: Iterable[int]) -> None:
-        """Request parts of an arena."""
         past = self._past(shard)
         assert past.in_parts is not None
         for part in parts:

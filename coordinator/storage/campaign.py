@@ -160,7 +160,6 @@ def joined_name(experiments: Sequence[Experiment]) -> str:
 
 
 def _check_folders(experiments: Sequence[Experiment]) -> None:
-    """Raise unless names can be those of folders."""
     for name in (experiment.name for experiment in experiments):
         if "/" in name or name.startswith("."):
             raise ExperimentError(
@@ -272,7 +271,6 @@ def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
 
 
 def _read(folder: Path) -> "_Document":
-    """Return the content of a folder's ``campaign.toml``."""
     try:
         text = read_small(folder / CAMPAIGN, MOST_DESCRIPTION).decode("utf-8")
         found = msgspec.convert(tomllib.loads(text), type=_Document)

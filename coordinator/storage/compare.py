@@ -61,7 +61,6 @@ def compare(first: Path, second: Path) -> list[str]:
 
 
 def _of_campaigns(*folders: Path) -> list[str]:
-    """Return the differences of two campaigns, run by run."""
     runs = [path.name for each in folders for path, _ in read_campaign(each).runs(each)]
     differences: dict[str, list[str]] = {}
     for name in dict.fromkeys(runs):
@@ -97,7 +96,6 @@ def _read(folder: Path, name: str) -> pa.Table:
 
 
 def _with_defaults(document: str) -> str:
-    """Return a document with the defaults of keys that it lacks."""
     try:
         return experiment_text(experiment_from_text(document))
     except ExperimentError:
@@ -172,14 +170,12 @@ def _drop_early_ends(tables: list[pa.Table], folders: tuple[Path, Path]) -> list
 
 
 def _last_births(population: pa.Table) -> dict[int, int]:
-    """Return the number of births of the last population of each island."""
     found = population.group_by("island").aggregate([("births", "max")])
     names = ("island", "births_max")
     return dict(zip(*(found[name].to_pylist() for name in names), strict=True))
 
 
 def _is_at(population: pa.Table, island: int, births: int) -> pa.ChunkedArray:
-    """Return which rows are of an island at a number of births."""
     is_there = pa.compute.equal(population["island"], island)
     is_then = pa.compute.equal(population["births"], births)
     return pa.compute.and_(is_there, is_then)

@@ -88,23 +88,6 @@ class Recorder:
         if len(table.buffered) >= BUFFERED:
             table.flush()
 
-    def store(self, event: Advanced) -> None:
-        """Write the poses of an advance to disk before the journal gets it.
-
-        Poses that an earlier process stored without their event in the journal are
-        removed first.
-        """
-        self.poses.store(event)
-
-    def append(self, event: Advanced) -> None:
-        """Add the poses of an advance in the journal; stored ones are only counted.
-
-        Raises:
-            RunFolderError: poses are missing on disk and the event does not hold
-                them, or the disk is full or failed.
-        """
-        self.poses.take_advance(event)
-
     def flush(self) -> None:
         """Write all buffered rows to disk."""
         for table in self._tables.values():
@@ -185,14 +168,21 @@ class TableFile:
         self._seen += 1
 
     def store(self, event: Advanced) -> None:
-        """Write poses ahead of the count; remove rows on disk that do not count."""
+        """Write the poses of an advance to disk before the journal gets it.
+
+        Those that an earlier process stored without their event are removed first.
+        """
         self.keep(self._seen + self._ahead)
         if event.pose_rows:
             self.add(_poses_of(event))
             self._ahead += event.pose_rows
 
     def take_advance(self, event: Advanced) -> None:
-        """Count the next poses; write them unless they are already on disk."""
+        """Count the poses of an advance in the journal; write them unless on disk.
+
+        Raises:
+            RunFolderError: they are neither on disk nor in the event.
+        """
         end = self._seen + event.pose_rows
         if self.stored < end:
             if event.advance.poses == NO_POSES:
@@ -305,7 +295,6 @@ def write_parquet(path: Path, table: str, parts: Iterable[pa.Table]) -> None:
 
 
 def _poses_of(event: Advanced) -> pa.Table:
-    """Return the poses of an advance as rows."""
     return PoseArrays.received(event.advance.poses).rows(event.island)
 
 

@@ -91,7 +91,10 @@ def write_results(command: str, options: Namespace) -> None:
     """
     is_ablation = command == "ablate"
     study: ModuleType = ablation if is_ablation else robustness
-    wanted = (_ablation_jobs if is_ablation else _change_jobs)(options)
+    if is_ablation:
+        wanted = _ablation_jobs(options)
+    else:
+        wanted = [job for one in chosen_robots(options.runs) for job in _changes(one)]
     stem: Path = options.out / ("ablation" if is_ablation else command)
     make_folder(stem.parent)
     path = stem.with_suffix(".parquet")
@@ -109,10 +112,6 @@ def write_results(command: str, options: Namespace) -> None:
         print(f"left out: figure: {error}")
     else:
         print(f"{stem}.png: figure, also as PDF")
-
-
-def _change_jobs(options: Namespace) -> list[ReevaluationJob]:
-    return [job for one in chosen_robots(options.runs) for job in _changes(one)]
 
 
 def _ablation_jobs(options: Namespace) -> list[ReevaluationJob]:

@@ -48,7 +48,6 @@ def main(arguments: list[str]) -> int:
 
 
 def _latex(runs: Runs) -> str:
-    """Return the comparison of all pairs of experiments."""
     with extra("a comparison needs", "analysis"):
         from analysis.comparison.comparison import comparison, outcomes_of
         from analysis.measures.study import measure_runs

@@ -27,7 +27,6 @@ def main(arguments: list[str]) -> int:
 
 
 def _chosen(options: Namespace) -> Robot:
-    """Return the robot that the flags name."""
     source, name = options.source, options.robot or BEST
     if options.experiment if source.is_dir() else options.robot:
         raise RevolveError(f"{source}: --robot is for a run, --experiment for a file")

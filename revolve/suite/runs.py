@@ -90,7 +90,6 @@ def in_window(experiment: Experiment, number: int) -> Experiment:
 
 
 def _evaluations(run: Run) -> int:
-    """Return the number of evaluations of a run, with the trials of newborns."""
     trials = run.learning.num_rows
     # A newborn that learns has one row of evaluations, for all of its trials.
     newborns = run.births.num_rows if trials else 0

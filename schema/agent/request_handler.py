@@ -167,7 +167,6 @@ class Server:
         return Reply(place, answered)
 
     def _known(self, task: RunningJob, request: Request) -> bytes | None:
-        """Return the answer to a request if it is kept."""
         if not isinstance(request.work, AdvanceShard):
             return self._answers.get(task)
         last = self._advances.get((request.run, request.work.island))

@@ -84,29 +84,9 @@ class Member:
         return f"revolve/{self.fleet}/{_CHUNKS[self.role]}/{self.name}"
 
 
-def agents_alive(fleet: str, role: Role) -> str:
-    """Return the key expression of all tokens of one role."""
-    return f"revolve/{fleet}/{_CHUNKS[role]}/*/alive"
-
-
-def poses_of_all(fleet: str) -> str:
-    """Return the key expression of ``Member.poses`` of all workers."""
-    return f"revolve/{fleet}/{_CHUNKS['worker']}/*/arena/*/pose"
-
-
-def migrants_of_all(fleet: str) -> str:
-    """Return the key expression of ``Member.migrants`` of all coordinators."""
-    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/migrants"
-
-
-def announced_by_all(fleet: str) -> str:
-    """Return the key expression of ``Member.announced`` of all coordinators."""
-    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/announced"
-
-
-def news_of_all(fleet: str) -> str:
-    """Return the key expression of ``Member.events`` of all coordinators."""
-    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/events"
+def key_of_all(fleet: str, role: Role, key: str) -> str:
+    """Return the key expression of a key of all members of a role."""
+    return f"revolve/{fleet}/{_CHUNKS[role]}/*/{key}"
 
 
 def member_of(key: str) -> Member:

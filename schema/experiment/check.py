@@ -163,7 +163,6 @@ def _degree_problems(migration: Migration, count: int) -> Iterator[str]:
 def _emigration_problems(
     own: Experiment, connected: Migration, number: int
 ) -> Iterator[str]:
-    """Yield what is wrong with the migration of one island."""
     assert own.migration is not None
     for name in ("topology", "degree", "p_rewire", "edges"):
         if getattr(own.migration, name) != getattr(connected, name):
@@ -176,7 +175,6 @@ def _emigration_problems(
 
 
 def _exchange_problems(own: Experiment, migration: Migration) -> Iterator[str]:
-    """Yield which exchange of migrants of a connected island is impossible."""
     selection, arena = own.selection, own.arena
     founders, epoch = selection.population, migration.epoch
     first = max(epoch, founders)

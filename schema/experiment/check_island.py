@@ -89,7 +89,6 @@ def _by(selection: SelectionSection) -> str:
 def _death_problems(
     experiment: Experiment, where: str, rules: ArenaSection | Culling, spare: int
 ) -> Iterator[str]:
-    """Yield what is wrong with the rules by which a population varies in size."""
     selection = experiment.selection
     if selection.survivors != "best" or not selection.keep_parents:
         rule = 'selection.survivors must be "best" and keep_parents true'
@@ -104,7 +103,6 @@ def _death_problems(
 
 
 def _clock_problems(experiment: Experiment) -> Iterator[str]:
-    """Yield which duration does not fit the clocks, off-line and in arenas."""
     clock, is_arena = experiment.simulation, experiment.arena is not None
     units = {"pose_steps": clock.pose_steps}
     if is_arena and experiment.learning is not None:
@@ -131,7 +129,6 @@ def _clock_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _arena_problems(experiment: Experiment, arena: ArenaSection) -> Iterator[str]:
-    """Yield what is wrong with distances and intervals of an arena."""
     radius_m = 0.5 * arena.wall_diameter_m
     if 0.0 < radius_m <= arena.birth_radius_m:
         rule = f"must be less than half of wall_diameter_m, {radius_m:g} m"
@@ -165,7 +162,6 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
 
 
 def _founders_problems(founders: Founders, population: int) -> Iterator[str]:
-    """Yield what is wrong with the founders of an island of so many."""
     sources = {key: getattr(founders, key) for key in ("files", "run", "genomes")}
     named = [f"founders.{key}" for key, value in sources.items() if value]
     if not named:

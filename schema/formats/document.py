@@ -62,7 +62,6 @@ class _Composer:
         return root
 
     def _node(self, event: yaml.Event, depth: int) -> DocumentNode:
-        """Return the node that begins with an event."""
         self._count += 1
         if self._count > MOST_NODES:
             raise _refusal(f"must have <= {MOST_NODES} values, got more", event)
@@ -262,7 +261,6 @@ def compose(text: str, file: str, language: str = "YAML") -> Table:
 
 
 def _shown(node: DocumentNode | None) -> str:
-    """Return a short description of a node for a message."""
     value = node.value if node is not None else ""
     if isinstance(value, str):
         return repr(value[:40]) if value else "nothing"

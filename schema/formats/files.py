@@ -184,7 +184,6 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def _written(robot: Robot, ending: str, settings: EvaluationSettings) -> bytes:
-    """Return the bytes of a robot in the format of an ending."""
     space, kinds = types_for(settings)
     if ending in _YAML:
         return robot_to_yaml(robot, space, kinds).encode()

@@ -52,7 +52,6 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
 
 
 def _link(model: mujoco.MjModel, body: int) -> ET.Element:
-    """Return the link of a body: its mass, boxes and cylinders."""
     link = ET.Element("link", name=model.body(body).name)
     inertial = ET.SubElement(link, "inertial")
     inertial.append(_origin(model.body_ipos[body], model.body_iquat[body]))
@@ -74,7 +73,6 @@ def _link(model: mujoco.MjModel, body: int) -> ET.Element:
 
 
 def _geometry(model: mujoco.MjModel, geom: int) -> ET.Element:
-    """Return the shape of a geom."""
     made = ET.Element("geometry")
     size = 2.0 * model.geom_size[geom]
     if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
@@ -88,7 +86,6 @@ def _geometry(model: mujoco.MjModel, geom: int) -> ET.Element:
 def _joint(
     model: mujoco.MjModel, joint: int, effort: float, velocity: float
 ) -> ET.Element:
-    """Return the joint between a body and its parent."""
     body = int(model.jnt_bodyid[joint])
     parent = model.body(int(model.body_parentid[body])).name
     kind = "revolute" if model.jnt_limited[joint] else "continuous"
@@ -125,5 +122,4 @@ def _origin(position: Floats, quaternion: Floats) -> ET.Element:
 
 
 def _numbers(values: Floats) -> str:
-    """Return numbers as text with all digits."""
     return " ".join(repr(float(value)) for value in values)

@@ -114,7 +114,6 @@ class RevolveReader(Reader):
         return own, hidden
 
     def _end(self, table: Table, default: _End) -> _End:
-        """Return the layer and part of a written neuron."""
         layer, part = default
         if table.has("layer"):
             word = table.word("layer", LAYERS)

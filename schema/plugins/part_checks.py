@@ -111,7 +111,6 @@ def _shape(kind: PartType, values: tuple[float, ...]) -> Shape:
 
 
 def _check_shape(kind: PartType, values: tuple[float, ...]) -> None:
-    """Raise for what is wrong with the shape of some parameters."""
     shape = _shape(kind, values)
     _check_slots(kind, shape.slots)
     names = [box.name for box in shape.boxes]
@@ -137,7 +136,6 @@ def _check_shape(kind: PartType, values: tuple[float, ...]) -> None:
 
 
 def _check_slots(kind: PartType, slots: Sequence[Slot]) -> None:
-    """Raise for what is wrong with the slots of a shape."""
     if len(slots) != kind.arity:
         raise broken("slots", f"be {kind.arity}, the arity", len(slots))
     for number, slot in enumerate(slots):
@@ -163,7 +161,6 @@ def _check_segments(kind: PartType, shape: Shape) -> None:
 
 
 def _check_joint(joint: Joint, motor: Motor | None) -> None:
-    """Raise for what is wrong with a joint and its motor."""
     _check_types(joint, "joint")
     is_continuous = joint.kind == "continuous"
     if is_continuous != (joint.limit == math.inf):

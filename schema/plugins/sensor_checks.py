@@ -133,7 +133,6 @@ def _number(value: object) -> float:
 
 
 def _views(shape: Shape | None) -> dict[str, HandMadeView]:
-    """Return the views by what they show."""
     speed, angle = 0.5, 0.1
     if shape is not None:
         speed = 0.0 if shape.joint is None else speed

@@ -83,7 +83,6 @@ def simple_traces(function: Callable[..., Any]) -> dict[str, Trace]:
 
 
 def _channels(count: int, heading: Floats) -> dict[str, Any]:
-    """Return all channels of a trace with some samples."""
     phase = np.arange(count) * _INTERVAL_S
     zero = np.zeros(count)
     wave = np.sin(phase)[:, np.newaxis]

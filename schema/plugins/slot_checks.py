@@ -60,7 +60,6 @@ def advise_shape(kind: PartType) -> str:
 
 
 def _in_box(box: Box, slot: Slot) -> tuple[Floats, Floats]:
-    """Return position and normal of a slot in the frame of a box."""
     turn = np.array(box.rotation, dtype=np.float64).T
     return turn @ np.subtract(slot.position, box.position), turn @ np.array(slot.normal)
 

@@ -120,7 +120,6 @@ def check_brain(brain: Brain, part_count: int) -> None:
 
 
 def _neuron_problem(neuron: Neuron, part_count: int) -> str:
-    """Return what is wrong with a neuron, or nothing."""
     if not 0 <= neuron.part < part_count:
         return f".part: must be 0..{part_count - 1}, got {neuron.part}"
     if neuron.layer == "input" and neuron.kind != INPUT:
@@ -171,7 +170,6 @@ def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
 
 
 def _connection_problem(edge: Connection, brain: Brain) -> str:
-    """Return what is wrong with a connection, or nothing."""
     count = len(brain.neurons)
     for name, end in (("source", edge.source), ("target", edge.target)):
         if not 0 <= end < count:

@@ -102,7 +102,6 @@ def _attached(ends: Sequence[tuple[Slot, Slot, int]]) -> tuple[Floats, Floats]:
 
 
 def _cross(first: Floats, second: Floats) -> Floats:
-    """Return the cross products of vectors along the last axis."""
     one, other = first.take(_NEXT, -1), first.take(_AFTER, -1)
     product: Floats = one * second.take(_AFTER, -1) - other * second.take(_NEXT, -1)
     return product

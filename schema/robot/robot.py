@@ -94,7 +94,6 @@ def _place_problem(part: Part, index: int) -> str:
 
 
 def _value_problem(part: Part) -> str:
-    """Return what is wrong with the numbers of a part of any type, or nothing."""
     if part.orientation not in ORIENTATIONS:
         got = shown(part.orientation)
         return f".orientation: must be one of {ORIENTATIONS}, got {got}"
@@ -152,7 +151,6 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
 
 
 def _type_problem(part: Part, index: int, space: BodySpace) -> str:
-    """Return in what a part does not fit its type, or nothing."""
     kind = space.get(part.kind) or part_type(part.kind, space, f"body.parts[{index}]")
     if kind.is_root != (index == 0):
         return f": exactly the first part must be a core, got {part.kind}"
@@ -192,7 +190,6 @@ def _check_order(parts: Sequence[Part]) -> None:
 
 
 def _check_wiring(robot: Robot, space: BodySpace) -> None:
-    """Raise unless inputs and outputs match the sensors and motors."""
     kinds = [space[part.kind] for part in robot.parts]
     inputs, outputs = [kind.inputs for kind in kinds], [kind.outputs for kind in kinds]
     for layer, counts in (("input", inputs), ("output", outputs)):

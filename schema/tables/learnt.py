@@ -1,17 +1,9 @@
 """Brains that robots learnt: those of arenas in the births table, and best trials."""
 
-from pathlib import Path
-
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from schema.robot.ids import BirthId
-from schema.tables.files import read_table
-
-
-def learnt_births(folder: Path) -> pa.Table:
-    """Return the births of a run, as ``with_learnt``; errors of ``read_table``."""
-    return with_learnt(read_table(folder, "births"), read_table(folder, "learning"))
 
 
 def with_learnt(births: pa.Table, learning: pa.Table) -> pa.Table:

@@ -166,11 +166,7 @@ def _layer(code: int) -> Layer:
 
 
 def _parsed(data: bytes, message: M) -> M:
-    """Return a message with the content of some bytes.
-
-    Raises:
-        MalformedMessage: too many bytes, or not those of such a message.
-    """
+    """Return a message with the content of bytes, or raise ``MalformedMessage``."""
     name = message.DESCRIPTOR.name
     _require_most(len(data), ROBOT_BYTES, f"{name} in bytes")
     try:
@@ -181,10 +177,6 @@ def _parsed(data: bytes, message: M) -> M:
 
 
 def _require_most(count: int, most: int, what: str) -> None:
-    """Raise if there are too many of something.
-
-    Raises:
-        MalformedMessage: more than ``most``.
-    """
+    """Raise ``MalformedMessage`` if there are more than ``most`` of something."""
     if count > most:
         raise MalformedMessage(f"{what}: must be <= {most}, got {count}", "too large")

@@ -26,7 +26,7 @@ from schema.agent.machine import wire_version
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.service import session_config
 from schema.agent.supervisor import stop_on_signals
-from schema.agent.topics import Member, Role, agents_alive, member_of
+from schema.agent.topics import Member, Role, key_of_all, member_of
 from schema.errors import MalformedMessage
 from schema.limits import ADVANCE_REQUEST_BYTES, BUNDLE_BYTES, MOST_EPOCH
 from schema.robot.ids import BirthId
@@ -158,7 +158,9 @@ class HostileClient:
         """Look for the processes of the fleet; return how many there are."""
         found = []
         for role in _ROLES:
-            for each in self._session.liveliness().get(agents_alive("default", role)):
+            for each in self._session.liveliness().get(
+                key_of_all("default", role, "alive")
+            ):
                 if each.ok:
                     try:
                         found.append(member_of(str(each.ok.key_expr)))

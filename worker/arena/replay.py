@@ -115,7 +115,6 @@ def together(
 
 
 def _motion(world: World, births: frozenset[BirthId]) -> pa.Table:
-    """Return the present poses of some robots."""
     poses = world.poses()
     is_chosen = [robot in births for robot in poses.robots]
     return poses.rows().filter(pa.array(is_chosen, pa.bool_()))

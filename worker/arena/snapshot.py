@@ -178,7 +178,6 @@ def _robot(data: bytes, settings: ArenaSettings) -> Robot:
 
 
 def _pack(numbers: Floats) -> bytes:
-    """Return numbers as bytes, without their shape."""
     return np.ascontiguousarray(numbers, dtype="<f8").tobytes()
 
 

@@ -324,7 +324,6 @@ class World:
             robot.window.restart()
 
     def _remove(self, casualties: Sequence[Casualty]) -> None:
-        """Remove robots, to be reported by the present advance."""
         self._casualties += casualties
         if casualties:
             self.population.remove([casualty.birth for casualty in casualties])

@@ -157,7 +157,6 @@ def _opened(path: Path) -> BinaryIO:
 def _rows(
     experiment: Experiment, size: int, options: argparse.Namespace, source: RobotSource
 ) -> Iterator[Row]:
-    """Yield the row of each repetition with a number of robots."""
     settings = arena_settings_of(experiment)
     if options.what == "spider":
         settings = replace(settings, arena=replace(settings.arena, drop_m=CLEARANCE_M))

@@ -86,7 +86,6 @@ def _whole(robot: Robot, settings: EvaluationSettings) -> float:
 
 
 def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
-    """Return the controls of each tick of a robot's evaluation."""
     found: list[Floats] = []
     evaluation.simulate(
         robot, settings, watch=lambda data: found.append(data.ctrl.copy())

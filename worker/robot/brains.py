@@ -166,7 +166,6 @@ def pack(
 
 
 def _set_neuron(neuron: Neuron, row: int, arrays: tuple[Floats, Floats, Mask]) -> None:
-    """Write a neuron's row into the arrays of a network."""
     weights, numbers, kinds = arrays
     values = [_bounded(value) for value in neuron.parameters]
     if neuron.kind == "Oscillator":

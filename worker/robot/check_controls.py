@@ -101,7 +101,6 @@ def _run(
 
 
 def _require(what: str, array: object, shape: tuple[int, int]) -> None:
-    """Raise unless a value is an array of float64 of a shape, and finite."""
     if not isinstance(array, np.ndarray):
         raise broken(what, "be an array of float64", came=f"a {type(array).__name__}")
     if array.dtype != np.float64 or array.shape != shape:

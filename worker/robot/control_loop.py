@@ -180,7 +180,6 @@ class ControlLoop:
         return self._channels.trace(self._robot, interval_s, positions, self._rows)
 
     def _think(self) -> Floats:
-        """Return the outputs of the robot's own brain, (1, O)."""
         outputs = self._brain.step(self._readings, float(self._tick))
         if not self._is_guarded:
             return outputs

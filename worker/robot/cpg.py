@@ -103,7 +103,6 @@ class CpgBank:
         return outputs
 
     def _after_step(self, phase: Floats) -> Floats:
-        """Return the states after one step of the integration."""
         half = 0.5 * self._step_s
         first = self._rate(phase)
         second = self._rate(phase + half * first)
@@ -113,7 +112,6 @@ class CpgBank:
         return phase + self._step_s / 6.0 * total
 
     def _rate(self, phase: Floats) -> Floats:
-        """Return the time derivative of the states."""
         differences = phase[:, np.newaxis, :] - phase[:, :, np.newaxis]
         pull: Floats = (self._coupling * np.sin(differences)).sum(axis=2)
         return self._frequency + pull

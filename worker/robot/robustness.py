@@ -66,16 +66,6 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
     )
 
 
-def small_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
-    """Return settings with finer time steps, less friction, and raised starts.
-
-    The settings have no ``robust``.
-
-    Source: own definition.
-    """
-    return tuple(change for change in all_changes(settings) if change.is_small)
-
-
 def window_changes(settings: EvaluationSettings) -> tuple[ChangedSettings, ...]:
     """Return settings of the windows after that of the evaluation, named by time."""
     changed = []

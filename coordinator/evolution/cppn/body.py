@@ -150,7 +150,6 @@ def parameters_from(
 
 
 def _rows(columns: Mapping[str, Floats]) -> list[Values]:
-    """Return the outputs of each of N queries."""
     lists = [column.tolist() for column in columns.values()]
     return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
 
@@ -236,7 +235,6 @@ def _local_boxes(shape: Shape) -> tuple[Floats, Floats]:
 
 
 def _is_blocked(grown: Grown, parent: Grown, parts: Sequence[Grown]) -> bool:
-    """Return whether a part intersects another one than its parent."""
     others = [part.boxes for part in parts if part is not parent]
     if not others:
         return False

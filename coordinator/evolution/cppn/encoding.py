@@ -33,11 +33,6 @@ from schema.robot.robot import Robot
 HIDDEN, LINK, WEIGHT = "hidden", "link", "weight"
 
 
-def brain_outputs(types: NeuronKinds) -> tuple[str, ...]:
-    """Return the names of the outputs that describe a brain."""
-    return (HIDDEN, LINK, WEIGHT, *_neuron_outputs(types))
-
-
 def grow_brain(
     network: CppnGenome, parts: Sequence[Grown], max_hidden: int, types: NeuronKinds
 ) -> Brain:
@@ -119,7 +114,8 @@ class Cppn:
         self._types = types
         self._rules = parameters
         self._neurons = neuron_kinds(experiment.brain, experiment.space)
-        self._outputs = (*body_outputs(types), *brain_outputs(self._neurons))
+        of_brains = (HIDDEN, LINK, WEIGHT, *_neuron_outputs(self._neurons))
+        self._outputs = (*body_outputs(types), *of_brains)
         # The robot is asked for once by mutation and once by the run.
         self._developed = lru_cache(maxsize=_CACHED)(self._grown)
 

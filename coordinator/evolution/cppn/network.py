@@ -152,7 +152,6 @@ def from_bytes(data: bytes, outputs: Sequence[str]) -> CppnGenome:
 
 
 def _problems(network: CppnGenome, outputs: Sequence[str]) -> Iterator[str]:
-    """Yield which rules a network breaks."""
     ids = [node.id for node in network.nodes]
     if ids != sorted(set(ids)) or {*ids} & {*INPUTS, *outputs}:
         yield "hidden nodes: must be sorted by id, each once, apart from all others"

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.cli.status import Source, main, show_source, status_json
-from coordinator.cli.status_text import fault_lines, group_lines, part_lines, state_of
+from coordinator.cli.status_text import fault_lines, group_lines, part_lines, run_table
 from coordinator.storage.campaign import Campaign, write_campaign
 from coordinator.storage.folder import RunFolder
 from schema.experiment.file import experiment_text, read_experiment
@@ -208,6 +208,6 @@ def test_a_run_without_agents_waits_for_them_if_its_coordinator_says_so() -> Non
         (2, 1, "running"),
     ):
         status = Status((running, stopped), workers, analyzers, 0.0)
-        assert state_of(running, status, is_live=True) == state
-        assert state_of(stopped, status, is_live=True) == "stopped"
-        assert state_of(running, status, is_live=False) == "running"
+        for is_live, shown in ((True, state), (False, "running")):
+            table = run_table(status, lambda run: run.name, is_live=is_live)
+            assert [*table.columns[1].cells] == [shown, "stopped"]

@@ -80,13 +80,13 @@ def test_an_answer_goes_to_its_client(fleet: JobRouter, agents: SentJobs) -> Non
     numbers = [request(fleet, client) for client in (CLIENT, OTHER)]
     shard = new_shard(fleet)
     fleet.advance(shard)
-    assert fleet.open == 3
+    assert fleet.dispatch.pending == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[1:]]
     ends = fleet.listen(0.0, 1.0)
     assert list(ends) == [OTHER, ARENA]
     assert ends[OTHER][0].job.number == numbers[1]
     assert ended(*ends[ARENA]) == (shard, agents.sent[2][1], b"x", "")
-    assert fleet.open == 1
+    assert fleet.dispatch.pending == 1
     assert fleet.listen(0.0, 2.0) == {}
 
 
@@ -103,7 +103,7 @@ def test_jobs_of_a_client_that_left_are_withdrawn(
 ) -> None:
     request(fleet)
     fleet.leave(CLIENT)
-    assert fleet.open == 0
+    assert fleet.dispatch.pending == 0
     ((number, agent, payload),) = agents.sent
     assert agents.cancelled == [(agent, payload)]
     agents.news = [Returned(number, agent, outcome, b"x", took_s=300.0)]
@@ -192,7 +192,7 @@ def test_a_job_whose_wait_is_over_stays_with_its_worker(
     (delivered,), (done,) = fleet.listen(0.0, 4000.0).values()
     assert isinstance(delivered, Deliver)
     assert ended(done) == (shard, first[1][1], b"x", "")
-    assert (fleet.faults.total("late"), fleet.open) == (0, 0)
+    assert (fleet.faults.total("late"), fleet.dispatch.pending) == (0, 0)
 
 
 def test_a_job_that_was_sent_again_took_all_the_time(
@@ -252,7 +252,7 @@ def test_a_state_that_cannot_be_read_ends_only_its_own_run(
         (shards[0], "", None, "island-0-5.bin: is missing"),
         (shards[1], agent, b"x", ""),
     ]
-    assert fleet.open == 0
+    assert fleet.dispatch.pending == 0
     assert not any(a.busy for a in fleet.dispatch.workers.agents.values())
 
 
@@ -301,7 +301,7 @@ def test_an_unfit_worker_gets_jobs_of_other_clients_only(
     request(fleet, OTHER)
     assert agents.sent[-1][1] == unfit
     fleet.tell(Left(other))
-    assert fleet.homes.waiting == {0: ""}
+    assert fleet.dispatch.homes.waiting == {0: ""}
     assert fleet.dispatch.fit("worker", CLIENT) == set()
     count = len(agents.sent)
     fleet.tell(Left(unfit))
@@ -351,7 +351,7 @@ def test_a_released_arena_leaves_room_for_another(
     fleet.advance(new_shard(fleet, OTHER))
     number, freed, payload = agents.sent[1]
     fleet.leave(OTHER)
-    assert fleet.open == 1
+    assert fleet.dispatch.pending == 1
     assert agents.cancelled == [(freed, payload)]
     fleet.advance(new_shard(fleet, CLIENT))
     assert agents.sent[2][1] == freed
@@ -407,7 +407,7 @@ def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
     assert (
         fleet.faults.total("late"),
         fleet.faults.total("malformed"),
-        fleet.open,
+        fleet.dispatch.pending,
     ) == (1, 0, 1)
     agents.news = [Returned(moved, "two", "ok", b"x")]
     (end,) = fleet.listen(0.0, 100.0)[ARENA]

@@ -25,7 +25,7 @@ from coordinator.dispatch.events import (
     Returned,
 )
 from coordinator.dispatch.fleet import JobRouter
-from coordinator.network.client_service import ask_coordinators
+from coordinator.network.client_service import asking
 from coordinator.network.operator_service import OperatorQuery
 from coordinator.network.service import Network
 from schema.agent.network import client_config
@@ -164,7 +164,7 @@ def test_each_job_is_delivered_once_by_two_workers(
     with agent(network, "a"), agent(network, "b"):
         listen(fleet, lambda: fleet.dispatch.agents("worker") == 2)
         numbers = ask(fleet, 500)
-        agents = listen(fleet, lambda: not fleet.open)
+        agents = listen(fleet, lambda: not fleet.dispatch.pending)
     assert sorted(agents) == numbers
     assert set(agents.values()) == {"a", "b"}
     # Once for each thread of the engine, not for each answer.
@@ -180,7 +180,7 @@ def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:
         assert line_of(process) == "begun\n"
         process.send_signal(signal.SIGKILL)
         with agent(network, "b"):
-            agents = listen(fleet, lambda: not fleet.open)
+            agents = listen(fleet, lambda: not fleet.dispatch.pending)
     assert agents == dict.fromkeys(numbers, "b")
 
 
@@ -439,8 +439,11 @@ def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> N
 
 def test_a_hub_without_a_coordinator_of_the_fleet_is_told(network: Network) -> None:
     expected = ": no coordinator of fleet other replies$"
-    with pytest.raises(NetworkError, match=expected):
-        ask_coordinators(b"", connect=network.address, fleet="other")
+    with (
+        asking(network.address, fleet="other", tls=None) as ask,
+        pytest.raises(NetworkError, match=expected),
+    ):
+        ask(b"")
 
 
 def test_replies_of_a_liar_end_each_of_its_jobs_once(network: Network) -> None:

@@ -135,12 +135,13 @@ class Run:
             other.pop("agents", LocalAgents)(agents, platform),
             allows_drift=other.pop("allows_drift", False),
         )
+        self.rows.poses = frail(self.rows.poses, point, "store")
         self.loop = Loop(
             islands,
             context=RunContext.of("resume", folder.epoch, document, DETAILS.origin),
             fleet=self.fleet,
             log=frail(journal, point, "append"),
-            rows=frail(self.rows, point, "store"),
+            rows=self.rows,
             snapshot_store=frail(Snapshots(path), point, "write", "drop_before"),
             **other,
         )

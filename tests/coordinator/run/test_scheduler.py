@@ -207,8 +207,8 @@ def test_runs_are_started_until_requests_are_twice_the_credits(tmp_path: Path) -
     assert len(scheduler.active) == 1
     scheduler.turn(0.0, lambda: 1.0)
     # Five founders of each are open; credits are 2 x 2.
-    assert scheduler.fleet.open == 10
-    assert scheduler.fleet.open >= SLACK * scheduler.fleet.dispatch.credits
+    assert scheduler.fleet.dispatch.pending == 10
+    assert scheduler.fleet.dispatch.pending >= SLACK * scheduler.fleet.dispatch.credits
     assert len(scheduler.active) == 2
     scheduler.close()
 

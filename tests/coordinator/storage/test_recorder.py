@@ -134,8 +134,8 @@ def written(folder: Path, *numbers: int) -> Recorder:
     """Return a recorder that stored and counted some bulk rows."""
     recorder = Recorder(folder, SCENARIO)
     for number in numbers:
-        recorder.store(bulk(number))
-        recorder.append(bulk(number))
+        recorder.poses.store(bulk(number))
+        recorder.poses.take_advance(bulk(number))
     return recorder
 
 
@@ -143,27 +143,27 @@ def replayed(folder: Path, *numbers: int) -> Recorder:
     """Return a recorder that counted some bulk rows which are on disk."""
     recorder = Recorder(folder, SCENARIO)
     for number in numbers:
-        recorder.append(bare(bulk(number)))
+        recorder.poses.take_advance(bare(bulk(number)))
     return recorder
 
 
 def test_bulk_rows_are_on_disk_when_they_are_stored(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, SCENARIO)
-    recorder.store(bulk(1))
+    recorder.poses.store(bulk(1))
     assert times(tmp_path) == [1.0] * 3
-    recorder.append(bulk(1))
+    recorder.poses.take_advance(bulk(1))
     assert times(tmp_path) == [1.0] * 3
-    recorder.append(bulk(2))
+    recorder.poses.take_advance(bulk(2))
     assert times(tmp_path) == [1.0] * 3 + [2.0] * 3
 
 
 def test_bulk_rows_may_be_stored_ahead_of_the_count(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, SCENARIO)
     for number in (1, 2, 3):
-        recorder.store(bulk(number))
+        recorder.poses.store(bulk(number))
     for number in (1, 2, 3):
-        recorder.append(bulk(number))
-    recorder.store(bulk(4))
+        recorder.poses.take_advance(bulk(number))
+    recorder.poses.store(bulk(4))
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0, 4.0]
 
 
@@ -172,11 +172,11 @@ def test_rows_without_a_journalled_event_are_removed(tmp_path: Path, kept: int) 
     """Three advances were stored over two segments; the journal has a few of them."""
     written(tmp_path, 1, 2).close()
     second = replayed(tmp_path, 1, 2)
-    second.store(bulk(3))
+    second.poses.store(bulk(3))
     second.close()
     recorder = replayed(tmp_path, *range(1, kept + 1))
-    recorder.store(bulk(9))
-    recorder.append(bulk(9))
+    recorder.poses.store(bulk(9))
+    recorder.poses.take_advance(bulk(9))
     expected = [*map(float, range(1, kept + 1)), 9.0]
     assert times(tmp_path)[::3] == expected
     recorder.finish()
@@ -189,7 +189,7 @@ def test_a_cut_segment_reads_on_after_a_kill(tmp_path: Path) -> None:
     path = segment_path(tmp_path, "poses", 0)
     data = path.read_bytes()
     path.write_bytes(data[:-20])
-    replayed(tmp_path, 1, 2).store(bulk(3))
+    replayed(tmp_path, 1, 2).poses.store(bulk(3))
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
 
 
@@ -197,11 +197,11 @@ def test_missing_rows_are_refused(tmp_path: Path) -> None:
     written(tmp_path, 1).close()
     recorder = replayed(tmp_path, 1)
     with pytest.raises(RunFolderError, match="poses: rows 3 to 5 are missing"):
-        recorder.append(bare(bulk(2)))
+        recorder.poses.take_advance(bare(bulk(2)))
 
 
 def test_no_rows_make_no_segment(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, SCENARIO)
-    recorder.store(bulk(1, rows=0))
-    recorder.append(bulk(1, rows=0))
+    recorder.poses.store(bulk(1, rows=0))
+    recorder.poses.take_advance(bulk(1, rows=0))
     assert segments_of(tmp_path, "poses") == []

@@ -16,11 +16,9 @@ from schema.agent.access import (
 )
 from schema.agent.topics import (
     Member,
-    agents_alive,
     check_name,
+    key_of_all,
     member_of,
-    news_of_all,
-    poses_of_all,
     unique_name,
 )
 from schema.errors import MalformedMessage, NetworkError
@@ -76,11 +74,23 @@ def test_only_operators_give_orders(role: CertificateRole) -> None:
 @pytest.mark.parametrize("role", ["viewer", "operator"])
 def test_viewers_read_only(role: CertificateRole) -> None:
     assert may(role, "v", "ingress", "query", COORDINATOR.state)
-    assert may(role, "v", "ingress", "declare_subscriber", news_of_all("default"))
-    assert may(role, "v", "ingress", "declare_subscriber", poses_of_all("default"))
+    assert may(
+        role,
+        "v",
+        "ingress",
+        "declare_subscriber",
+        key_of_all("default", "coordinator", "events"),
+    )
+    assert may(
+        role,
+        "v",
+        "ingress",
+        "declare_subscriber",
+        key_of_all("default", "worker", "arena/*/pose"),
+    )
     assert may(
         role, "v", "ingress", "declare_liveliness_subscriber",
-        agents_alive("default", "coordinator"),
+        key_of_all("default", "coordinator", "alive"),
     )  # fmt: skip
     for message in ("put", "reply", "declare_queryable", "liveliness_token"):
         assert not may(role, "v", "ingress", message, COORDINATOR.events)
@@ -151,7 +161,7 @@ def test_all_keys_of_a_process_have_one_prefix(member: Member, prefix: str) -> N
 
 
 def test_tokens_of_one_role_are_found_by_one_expression() -> None:
-    expression = zenoh.KeyExpr(agents_alive("f", "worker"))
+    expression = zenoh.KeyExpr(key_of_all("f", "worker", "alive"))
     assert expression.includes(Member("f", "worker", "a.b").alive)
     assert not expression.intersects(Member("f", "analyzer", "a").alive)
     assert not expression.intersects(Member("g", "worker", "a").alive)
