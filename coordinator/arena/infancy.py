@@ -87,13 +87,15 @@ class Infancy:
         Returns:
             The first request to its learner.
         """
-        learning = NewbornLearning(candidate, self._island)
+        learning = NewbornLearning(candidate, self._island, self._living.mature())
         if not learning.learns:
             return []
         self._found(candidate.birth).is_infant = True
         end = step + self._warmup + self._window
-        self._infants[candidate.birth] = _Infant(learning, end)
-        return _asks(learning.start())
+        commands = learning.start()
+        _, *samples = (each for each in commands if isinstance(each, Evaluate))
+        self._infants[candidate.birth] = _Infant(learning, end, queue=deque(samples))
+        return _asks(commands)
 
     def take(self, event: Asked, step: int) -> bool:
         """Take the trials that a learner wants; return whether they are new.

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import Any
 
 from coordinator.evolution.cpg import CpgGenes
+from coordinator.evolution.modular import ModularGenes
 from coordinator.evolution.network import NetworkGenes
 from schema.experiment.brains import brain_half
 from schema.experiment.document import Experiment
@@ -13,6 +14,7 @@ from schema.plugins.protocols import BrainGenes, BrainRules, NeuronType
 BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainGenes]] = {
     "network": NetworkGenes,
     "cpg": CpgGenes,
+    "modular": ModularGenes,
 }
 
 

@@ -262,7 +262,7 @@ class Ask(Message, frozen=True):
 
     Attributes:
         number: number of the request, from 0.
-        start: parameters of the brain at birth, as shares of their ranges.
+        start: parameters at which the learner begins, as shares of their ranges.
         most: greatest number of points, at least 1.
         told: what was tried so far, all trials of a request together.
     """

@@ -180,7 +180,7 @@ class Island:
         newborn.candidate = candidate
         if self._learning is None:
             return [Evaluate(candidate.birth, candidate.robot)]
-        newborn.learning = NewbornLearning(candidate, self._learning)
+        newborn.learning = NewbornLearning(candidate, self._learning, self.population)
         return [*newborn.learning.start()]
 
     def _evaluated(self, event: Outcome) -> list[IslandCommand]:

@@ -18,7 +18,10 @@ from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import BrainType, NeuronType
 from schema.robot.brain import NeuronKinds, Widths
 from schema.robot.cpg import CpgParameters, cpg_neurons
+from schema.robot.modular import MODULE_KINDS, WEIGHT
 from schema.robot.neurons import BUILT_IN_NEURONS
+from schema.robot.origins import names_of, roles_of
+from schema.robot.robot import Robot
 
 Half = TypeVar("Half")
 
@@ -30,11 +33,17 @@ class NoParameters(Struct, frozen=True):
     """Parameters of a plug-in that declares none."""
 
 
+Names = Callable[[Robot], tuple[Sequence[object], Sequence[object]]]
+"""Returns names of neurons and of connections; equal names are one of both."""
+
+
 class _BuiltIn(NamedTuple):
     """What coordinator and worker, which have one half each, agree on."""
 
     parameters: type[Struct]
     neurons: Callable[[Any, tuple[NeuronType, ...]], NeuronKinds]
+    weights: tuple[float, float] = (0.0, 1.0)
+    names: Names = names_of
 
 
 def kinds_of(types: Sequence[NeuronType]) -> NeuronKinds:
@@ -45,7 +54,12 @@ def kinds_of(types: Sequence[NeuronType]) -> NeuronKinds:
 _BUILT_IN = {
     "network": _BuiltIn(NoParameters, lambda _, types: kinds_of(types)),
     "cpg": _BuiltIn(CpgParameters, lambda parameters, _: cpg_neurons(parameters)),
+    "modular": _BuiltIn(
+        NoParameters, lambda *_: MODULE_KINDS, (WEIGHT.low, WEIGHT.high), roles_of
+    ),
 }
+_OWN = _BUILT_IN["network"]
+"""Weights and names of a user's brain type."""
 
 
 @lru_cache(maxsize=64)
@@ -90,6 +104,20 @@ def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
     built_in = load_object(brain.type, _TYPE, _BUILT_IN)
     parameters = _parameters(brain, built_in.parameters)
     return built_in.neurons(parameters, neuron_types(space.neuron_types))
+
+
+def weight_range(brain: BrainSection) -> tuple[float, float]:
+    """Return the least and the greatest random weight of a brain type."""
+    return _BUILT_IN.get(brain.type, _OWN).weights
+
+
+def element_names(brain: BrainSection) -> Names:
+    """Return what names the neurons and connections of a brain type's robots.
+
+    Robots whose names are equal have them in common: by the origin of their parts, or
+    because all robots of the type have them. Elements of one name share their numbers.
+    """
+    return _BUILT_IN.get(brain.type, _OWN).names
 
 
 def brain_half(

@@ -8,6 +8,7 @@ from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.changes import change_problems
 from schema.experiment.document import (
     FOUNDERS,
+    REVOLVE_ANGLE,
     ArenaSection,
     Culling,
     Experiment,
@@ -23,6 +24,7 @@ from schema.experiment.section import multiple_problems
 from schema.experiment.selection_rules import rule_problems
 from schema.experiment.settings import FITNESS, arena_problems
 from schema.plugins.load import unknown
+from schema.robot.modular import MODULE_NEURONS
 
 
 def island_problems(experiment: Experiment) -> Iterator[str]:
@@ -44,6 +46,8 @@ def island_problems(experiment: Experiment) -> Iterator[str]:
     yield from range_problems(experiment.robust)
     yield from change_problems(experiment)
     yield from _learning_problems(experiment)
+    if experiment.brain.type == "modular":
+        yield from _modular_problems(experiment)
     if (founders := experiment.founders) is not None:
         yield from _founders_problems(founders, experiment.selection.population)
     if arena is not None:
@@ -149,16 +153,37 @@ def _learning_problems(experiment: Experiment) -> Iterator[str]:
         return
     if ":" not in learning.learner and learning.learner not in LEARNERS:
         yield str(unknown(learning.learner, "learning.learner", LEARNERS))
-    low, high = learning.weight_limits
-    if low == high:
-        yield f"learning.weight_limits: must be two numbers, got {low:g} twice"
-    yield from ordered("learning.weight_limits", learning.weight_limits)
+    if learning.weight_limits is not None:
+        low, high = learning.weight_limits
+        if low == high:
+            yield f"learning.weight_limits: must be two numbers, got {low:g} twice"
+        yield from ordered("learning.weight_limits", learning.weight_limits)
+    if learning.budget <= learning.samples:
+        rule = f"must be > {learning.samples}, the samples of parents and peers"
+        yield f"learning.budget: {rule}, got {learning.budget}"
     if experiment.selection.reevaluation is not None:
         yield "learning: cannot be combined with selection.reevaluation; remove one"
-    if learning.inherit == "lamarckian" and experiment.encoding.type == "cppn":
+    if experiment.encoding.type == "cppn" and learning.inherit == "lamarckian":
         why = "no pattern can be made of a given brain"
         rule = "must be 'darwinian' with encoding.type = 'cppn'"
         yield f"learning.inherit: {rule}: {why}"
+    if experiment.encoding.type == "cppn" and learning.samples:
+        key = "peers" if learning.peers else "inherit"
+        why = "samples need parts of known origin, and encoding.type = 'cppn' has none"
+        yield f"learning.{key}: {why}"
+
+
+def _modular_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield why a robot may not have a module in each part."""
+    space, encoding = experiment.space, experiment.encoding.type
+    least = MODULE_NEURONS * space.max_parts
+    if encoding != REVOLVE_ANGLE:
+        rule = f"must be {REVOLVE_ANGLE!r} with brain.type = 'modular'"
+        yield f"encoding.type: {rule}, got {shown(encoding)}"
+    if space.max_hidden < least:
+        rule = f"must be >= {least} with brain.type = 'modular', {MODULE_NEURONS} for"
+        parts = f"each of space.max_parts = {space.max_parts} parts"
+        yield f"space.max_hidden: {rule} {parts}, got {space.max_hidden}"
 
 
 def _founders_problems(founders: Founders, population: int) -> Iterator[str]:

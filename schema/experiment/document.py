@@ -96,7 +96,8 @@ class BrainSection(PluginSection, frozen=True):
     Attributes:
         type: short name of a built-in type, or ``module:attribute``: ``network`` is
             the thesis's recurrent network of ``space.neuron_types``, ``cpg`` couples
-            an oscillator for each motor.
+            an oscillator for each motor, ``modular`` has a small network of common
+            weights for each part.
         parameters: parameters of the type.
     """
 

@@ -10,6 +10,8 @@ LEARNERS = ("cma-es", "(1+1)-es", "random")
 """Built-in learners."""
 MOST_TRIALS = 1000
 """Most trials of one newborn."""
+PARENTS = 2
+"""Parents whose best brains are samples."""
 
 
 class Learning(PluginSection, frozen=True):
@@ -29,10 +31,14 @@ class Learning(PluginSection, frozen=True):
         sigma: standard deviation of the learner's first steps, as a share of the range
             of each parameter; ``random`` ignores it.
         inherit: ``darwinian``: children inherit the genome that the robot was born
-            with; ``lamarckian``: its genome gets what it learnt.
-        weight_limits: least and greatest weight; random weights of the built-in brain
-            types are from 0 to 1. The range of a neuron's parameter is that of its
-            type.
+            with; ``lamarckian``: its genome gets what it learnt; ``samples``: as
+            ``darwinian``, but the first trials of a child are the best brains of its
+            parents, in its own body.
+        peers: social learning: number of the fittest robots of the population whose
+            brains are tried, too, before the learner begins at the best one.
+        weight_limits: least and greatest weight; not given, the range of random
+            weights: -2 to 2 of ``modular`` brains, 0 to 1 of others. The range of a
+            neuron's parameter is that of its type.
         parameters: parameters of the learner.
     """
 
@@ -40,6 +46,12 @@ class Learning(PluginSection, frozen=True):
     budget: Annotated[int, Meta(ge=1, le=MOST_TRIALS)] = 20
     what: Literal["all", "weights", "neurons"] = "all"
     sigma: Annotated[float, Meta(gt=0, le=1)] = 0.2
-    inherit: Literal["darwinian", "lamarckian"] = "darwinian"
-    weight_limits: tuple[Number, Number] = (0.0, 1.0)
+    inherit: Literal["darwinian", "lamarckian", "samples"] = "darwinian"
+    peers: Annotated[int, Meta(ge=0, lt=MOST_TRIALS)] = 0
+    weight_limits: tuple[Number, Number] | None = None
     parameters: Parameters = field(default_factory=dict)
+
+    @property
+    def samples(self) -> int:
+        """Greatest number of brains of others that a newborn tries first."""
+        return self.peers + (PARENTS if self.inherit == "samples" else 0)

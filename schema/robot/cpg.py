@@ -17,6 +17,7 @@ from msgspec import Meta, Struct
 
 from schema.parts import Parameter
 from schema.robot.brain import NEURON_TYPES, NeuronKinds
+from schema.robot.modular import MODULE_KINDS
 
 PHASE_OSCILLATOR = "PhaseOscillator"
 
@@ -56,5 +57,9 @@ def cpg_neurons(parameters: CpgParameters) -> NeuronKinds:
     }
 
 
-BUILT_IN_KINDS: NeuronKinds = {**NEURON_TYPES, **cpg_neurons(CpgParameters())}
+BUILT_IN_KINDS: NeuronKinds = {
+    **NEURON_TYPES,
+    **cpg_neurons(CpgParameters()),
+    **MODULE_KINDS,
+}
 """Types of output and hidden neurons of the built-in brain types."""

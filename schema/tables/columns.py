@@ -305,7 +305,7 @@ LEARNING = _table(
         "request",
         pa.int32(),
         "number of the request to the learner that led to this trial; trials of one "
-        "request are tried together",
+        "request are tried together; 0 at samples, which are tried before",
     ),
     _fitness("higher is better; null if the trial failed"),
     _column("reason", pa.string(), "of a failure; otherwise empty"),
@@ -334,6 +334,12 @@ LEARNING = _table(
         pa.binary(),
         "Protobuf bytes of the robot that grew up in an arena with this trial's brain; "
         "null in its other trials, and off-line, where births has it",
+    ),
+    _nullable(
+        "sample_of",
+        PARENT,
+        "birth of the parent or peer whose brain this trial has, as far as the bodies "
+        "have parts in common; null in other trials",
     ),
 )
 POPULATION = _table(

@@ -34,6 +34,7 @@ from worker.robot.banks import (
 )
 from worker.robot.check_controls import check_controls
 from worker.robot.cpg import CpgControl
+from worker.robot.modular import ModularControl
 from worker.robot.own_neurons import OwnNeuron
 
 _NUMBER_LIMIT = 1e100
@@ -62,6 +63,7 @@ class NetworkControl:
 BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainControl]] = {
     "network": NetworkControl,
     "cpg": CpgControl,
+    "modular": ModularControl,
 }
 
 

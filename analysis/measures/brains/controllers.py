@@ -8,15 +8,9 @@ import pyarrow as pa
 
 from schema.robot.brain import Layer
 from schema.robot.genome import Genome, neighbours_of, walk
+from schema.robot.origins import Name, names_of, part_names
 from schema.robot.robot import Robot
 from schema.wire.protobuf import decode_genome, decode_robot
-
-Name = tuple[int, int, Layer, str, int]
-"""Name of a neuron.
-
-The gene of its part, the number of that gene in the body (some parts are copies), the
-layer, its type, and its number among those of this layer and type in the part.
-"""
 
 Place = tuple[int, Layer, int]
 """Index of a neuron's part, its layer, and its number in that layer of the part."""
@@ -82,46 +76,24 @@ def of_genome(genome: Genome) -> Controller:
     return _named([node.gene for node, _, _ in entries], neurons, edges)
 
 
-def of_robot(robot: Robot) -> Controller:
-    """Return the network of a robot."""
-    counts: Counter[tuple[int, Layer]] = Counter()
-    places: list[Place] = []
-    neurons: dict[Place, tuple[str, tuple[float, ...]]] = {}
-    for neuron in robot.brain.neurons:
-        place = neuron.part, neuron.layer, counts[neuron.part, neuron.layer]
-        counts[neuron.part, neuron.layer] += 1
-        places.append(place)
-        if neuron.layer != "input":
-            neurons[place] = neuron.kind, neuron.parameters
-    edges = {
-        (places[edge.source], places[edge.target]): edge.weight
-        for edge in robot.brain.connections
-    }
-    return _named([part.gene for part in robot.parts], neurons, edges)
-
-
 def _named(
     genes: Sequence[int],
     neurons: Mapping[Place, tuple[str, tuple[float, ...]]],
     edges: Mapping[tuple[Place, Place], float],
 ) -> Controller:
     """Return a network by names; edges without one of their neurons are left out."""
-    seen: Counter[int] = Counter()
-    copies: list[int] = []
-    for gene in genes:
-        copies.append(seen[gene])
-        seen[gene] += 1
+    copies = part_names(genes)
     counts: Counter[tuple[int, Layer, str]] = Counter()
     names: dict[Place, Name] = {}
     for place, (kind, _) in neurons.items():
         part, layer, _ = place
-        names[place] = genes[part], copies[part], layer, kind, counts[part, layer, kind]
+        names[place] = *copies[part], layer, kind, counts[part, layer, kind]
         counts[part, layer, kind] += 1
 
     def name(place: Place) -> Name | None:
         part, layer, number = place
         if layer == "input":
-            return genes[part], copies[part], layer, "", number
+            return *copies[part], layer, "", number
         return names.get(place)
 
     weights: dict[tuple[Name, Name], float] = {}
@@ -131,3 +103,17 @@ def _named(
             weights[source, target] = weight
     parameters = {names[place]: values for place, (_, values) in neurons.items()}
     return Controller(parameters, weights, all(genes))
+
+
+def of_robot(robot: Robot) -> Controller:
+    """Return the network of a robot."""
+    names, ends = names_of(robot)
+    brain = robot.brain
+    neurons = {
+        name: neuron.parameters
+        for name, neuron in zip(names, brain.neurons, strict=True)
+        if neuron.layer != "input"
+    }
+    weights = (edge.weight for edge in brain.connections)
+    has_origin = all(part.gene for part in robot.parts)
+    return Controller(neurons, dict(zip(ends, weights, strict=True)), has_origin)

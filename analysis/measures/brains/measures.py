@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.brains.controllers import Controller, Name, controllers
+from analysis.measures.brains.controllers import Controller, controllers
 from analysis.measures.diversity.distances import distances_of
 from analysis.measures.population_table import Numbers
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.cpg import BUILT_IN_KINDS
+from schema.robot.origins import Name
 from schema.robot.trees import Trees
 
 _DEAF = "Oscillator"
