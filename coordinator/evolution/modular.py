@@ -4,13 +4,13 @@ Every part has the genes of its own module. Crossover may join parts of two sets
 weights; mutation then makes one of them. See ``schema.robot.modular``.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TypeVar
 
 from schema.experiment.brains import NoParameters
 from schema.parts import PartType
 from schema.plugins.protocols import BrainRules, Branch, Draws, NeuronType
-from schema.robot.brain import Layer, NeuronKinds
+from schema.robot.brain import LAYERS, Layer, NeuronKinds
 from schema.robot.genome import ConnectionGene, NeuronGene
 from schema.robot.modular import (
     MODULE_KINDS,
@@ -18,12 +18,14 @@ from schema.robot.modular import (
     MODULE_NEURONS,
     WEIGHT,
     Role,
+    place_of,
 )
 
 B = TypeVar("B", bound=Branch)
 
 End = tuple[Layer, int]
 """Layer and offset of a neuron within its part."""
+_STATES: tuple[Layer, ...] = ("output", "hidden")
 _BIAS = MODULE_KINDS[MODULE_NEURON]
 _BLANK = NeuronGene(MODULE_NEURON, (0.0,))
 
@@ -42,16 +44,16 @@ class Shared:
         biases: dict[int, list[float]] = {}
         weights: dict[Role, list[float]] = {}
         for branch in branches:
-            for place, gene in enumerate((*branch.outputs, *branch.hidden)):
-                _note(biases.setdefault(place, []), gene.parameters[0])
-            genes = {
-                (gene.source, gene.path, gene.target): gene.weight
-                for gene in branch.connections
-            }
-            for role, source, path, target in _connections(branch):
-                weight = genes.get((source, path, target))
-                if weight is not None:
-                    _note(weights.setdefault(role, []), weight)
+            own = zip(_STATES, (branch.outputs, branch.hidden), strict=True)
+            for layer, genes in own:
+                for offset, gene in enumerate(genes):
+                    values = biases.setdefault(place_of(layer, offset), [])
+                    _note(values, gene.parameters[0])
+            for edge in branch.connections:
+                end = branch.along(edge.path)
+                if end is not None and (relation := _relation(branch, end)):
+                    role = _role(branch, edge.source, relation, edge.target)
+                    _note(weights.setdefault(role, []), edge.weight)
         self.biases = {role: draws.pick(found) for role, found in biases.items()}
         self.weights = {role: draws.pick(found) for role, found in weights.items()}
 
@@ -65,24 +67,37 @@ class Shared:
     def write(self, branches: Sequence[Branch]) -> None:
         """Give each branch a module of these numbers."""
         for branch in branches:
-            genes = tuple(map(self._neuron, range(MODULE_NEURONS)))
             motors = len(branch.outputs)
-            branch.outputs, branch.hidden = genes[:motors], genes[motors:]
+            branch.outputs = self._neurons("output", motors)
+            branch.hidden = self._neurons("hidden", MODULE_NEURONS - motors)
         for branch in branches:
+            around = [branch, *branch.children.values()]
+            if branch.parent is not None:
+                around.append(branch.parent)
             branch.connections = tuple(
-                ConnectionGene(source, path, target, self._weight(role))
-                for role, source, path, target in _connections(branch)
+                self._connection(branch, source, end, target)
+                for end in around
+                for source in branch.neurons(*(LAYERS if end is branch else _STATES))
+                for target in end.neurons(*_STATES)
             )
 
-    def _neuron(self, place: int) -> NeuronGene:
-        if place not in self.biases:
-            (self.biases[place],) = self._draws.values(_BIAS)
-        return NeuronGene(MODULE_NEURON, (self.biases[place],))
+    def _neurons(self, layer: Layer, count: int) -> tuple[NeuronGene, ...]:
+        genes = []
+        for offset in range(count):
+            place = place_of(layer, offset)
+            if place not in self.biases:
+                (self.biases[place],) = self._draws.values(_BIAS)
+            genes.append(NeuronGene(MODULE_NEURON, (self.biases[place],)))
+        return tuple(genes)
 
-    def _weight(self, role: Role) -> float:
+    def _connection(
+        self, branch: B, source: End, end: B, target: End
+    ) -> ConnectionGene:
+        role = _role(branch, source, _relation(branch, end), target)
         if role not in self.weights:
             (self.weights[role],) = self._draws.values((WEIGHT,))
-        return self.weights[role]
+        path = branch.path_to(end)
+        return ConnectionGene(source, path, target, self.weights[role])
 
 
 class ModularGenes:
@@ -129,17 +144,18 @@ def _note(values: list[float], value: float) -> None:
         values.append(value)
 
 
-def _connections(branch: B) -> Iterator[tuple[Role, End, tuple[int, ...], End]]:
-    """Yield role, source, path and target of the connections from a part's neurons."""
-    targets = branch.neurons("output", "hidden")
-    for place, source in enumerate(branch.neurons("input")):
-        for at, target in enumerate(targets):
-            yield ("input", branch.kind.name, place, at), source, (), target
-    others = [("own", branch), *(("parent", each) for each in branch.children.values())]
-    if branch.parent is not None:
-        others.append(("child", branch.parent))
-    for relation, other in others:
-        path = branch.path_to(other)
-        for place, source in enumerate(targets):
-            for at, target in enumerate(other.neurons("output", "hidden")):
-                yield ("state", relation, place, at), source, path, target
+def _relation(branch: B, end: B) -> str:
+    """Return what a part is to that at the end of a connection; nothing if far."""
+    if end is branch:
+        return "own"
+    if end is branch.parent:
+        return "child"
+    return "parent" if end.parent is branch else ""
+
+
+def _role(branch: Branch, source: End, relation: str, target: End) -> Role:
+    """Return the role of a connection from a neuron of a part."""
+    layer, kind = "state", relation
+    if source[0] == "input":
+        layer, kind = "input", branch.kind.name
+    return layer, kind, place_of(*source), place_of(*target)

@@ -16,7 +16,7 @@ learnt outputs; here a message is the state.
 """
 
 from schema.parts import Parameter
-from schema.robot.brain import NeuronKinds
+from schema.robot.brain import Layer, NeuronKinds
 
 MODULE_NEURON = "ModuleNeuron"
 MODULE_NEURONS = 2
@@ -31,6 +31,14 @@ Role = tuple[str, str, int, int]
 """What a shared weight connects: layer of the source, relation, both places.
 
 The relation is that of the source's module to the target's, ``own``, ``parent`` or
-``child``; of an input it is the type of its part. Places count the neurons of a
-module, and the inputs of a part.
+``child``; of an input it is the type of its part. Places are as of ``place_of``.
 """
+
+
+def place_of(layer: Layer, offset: int) -> int:
+    """Return the place of a neuron in its module, of an input in its part.
+
+    Hidden neurons count from the last place down: with a motor or without, the same
+    neuron has the same place.
+    """
+    return MODULE_NEURONS - 1 - offset if layer == "hidden" else offset

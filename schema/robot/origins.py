@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable
 
 from schema.robot.brain import Layer
-from schema.robot.modular import Role
+from schema.robot.modular import Role, place_of
 from schema.robot.robot import Robot
 
 Name = tuple[int, int, Layer, str, int]
@@ -45,12 +45,12 @@ def roles_of(robot: Robot) -> tuple[list[int], list[Role]]:
 
     Neurons of one place have one bias, connections of one role one weight.
     """
+    counts: Counter[tuple[int, Layer]] = Counter()
     places: list[int] = []
-    inputs, states = ([0] * len(robot.parts) for _ in range(2))
     for neuron in robot.brain.neurons:
-        counts = inputs if neuron.layer == "input" else states
-        places.append(counts[neuron.part])
-        counts[neuron.part] += 1
+        own = neuron.part, neuron.layer
+        places.append(place_of(neuron.layer, counts[own]))
+        counts[own] += 1
     roles: list[Role] = []
     for edge in robot.brain.connections:
         source = robot.brain.neurons[edge.source]

@@ -9,6 +9,7 @@ from schema.plugins.protocols import NeuronType
 from schema.robot.brain import Brain, NeuronKinds, Widths
 from schema.robot.modular import MODULE_KINDS, SENSOR_GAIN
 from worker.robot.banks import NetworkBank, PackedNetwork
+from worker.robot.cpg import NUMBER_LIMIT
 
 
 class ModularControl:
@@ -36,12 +37,14 @@ class ModularControl:
                 numbers[:, place - width.inputs] = 0.0, -bias, 0.5, 0.5
                 kinds[0, place - width.inputs] = True
         for edge in brain.connections:
-            row, source = places[edge.target] - width.inputs, places[edge.source]
-            if source < width.inputs:
-                weights[row, source] = SENSOR_GAIN * edge.weight
-            else:
-                weights[row, source] = 2.0 * edge.weight
-                numbers[1, row] += edge.weight
+            row = places[edge.target] - width.inputs
+            weights[row, places[edge.source]] = edge.weight
+        # Numbers of files may be far out of their ranges.
+        for array in (weights, numbers):
+            np.clip(array, -NUMBER_LIMIT, NUMBER_LIMIT, out=array)
+        numbers[1] += weights[:, width.inputs :].sum(axis=1)
+        weights[:, : width.inputs] *= SENSOR_GAIN
+        weights[:, width.inputs :] *= 2.0
         return PackedNetwork(weights, numbers, kinds)
 
     def bank(

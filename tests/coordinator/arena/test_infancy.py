@@ -20,7 +20,6 @@ from coordinator.islands.events import (
 )
 from coordinator.run.learners import Learners
 from schema.errors import UnexpectedEvent
-from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.experiment.identity import Origin
 from schema.experiment.learning import Learning
@@ -116,10 +115,12 @@ def test_an_infancy_of_three_trials_by_hand() -> None:
     changes = exchanged(run, FIRST)
     assert [step for step, _ in changes] == [3000, 5400, 7800]
     assert all(change.restarts_window for _, change in changes)
-    kinds = neuron_kinds(document.brain, document.space)
     assert document.learning is not None
-    read = BrainParameters(document.learning, kinds).read
-    shares = [read(change.brain) for _, change in changes]
+    read = BrainParameters(document.learning, document.brain, document.space).read
+    parts = decode_robot(
+        next(row["robot"] for row in run.rows("learning") if row["robot"])
+    ).parts
+    shares = [read(Robot(parts, change.brain)) for _, change in changes]
     assert [max(each) for each in shares] == pytest.approx([LOW, HIGH, LOW])
     assert [min(each) for each in shares] == pytest.approx([LOW, HIGH, LOW])
     assert trials(run, FIRST) == [

@@ -114,9 +114,10 @@ def test_broken_genes_are_refused(
 
 
 @pytest.mark.usefixtures("_own_brains")
-@pytest.mark.parametrize("name", ["network", "cpg", "my_brains:Wave"])
+@pytest.mark.parametrize("name", ["network", "cpg", "modular", "my_brains:Wave"])
 def test_sound_brain_types_pass(name: str) -> None:
-    check_brain_genes(Experiment(name="x", brain=BrainSection(type=name)))
+    brain, space = BrainSection(type=name), Space(max_hidden=60)
+    check_brain_genes(Experiment(name="x", brain=brain, space=space))
 
 
 def test_lists_of_genes_become_tuples(

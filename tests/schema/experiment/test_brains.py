@@ -68,7 +68,7 @@ def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('[brain]\ntype = "cpgs"', "brain.type: must be one of network, cpg or "),
+        ('[brain]\ntype = "cpgs"', "type: must be one of network, cpg, modular or "),
         ('[brain]\ntype = "cpgs"', "did you mean 'cpg'"),
         ('[brain]\ntype = "my_brains:Waves"', r"brain\.type: my_brains\.py:\d+: "),
         ('[brain]\ntype = "my_brains:Wav"', "did you mean 'my_brains:Wave"),

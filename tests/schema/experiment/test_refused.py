@@ -103,6 +103,23 @@ OTHERS = [
         "[encoding]\ntype = 'cppn'\n[learning]\ninherit = 'lamarckian'",
         "learning.inherit: must be 'darwinian' with encoding.type = 'cppn'",
     ),
+    (
+        "[encoding]\ntype = 'cppn'\n[learning]\ninherit = 'samples'",
+        "learning.inherit: samples need parts of known origin, and .*'cppn' has none",
+    ),
+    (
+        "[encoding]\ntype = 'cppn'\n[learning]\npeers = 1",
+        "learning.peers: samples need",
+    ),
+    (
+        "[learning]\nbudget = 4\ninherit = 'samples'\npeers = 2",
+        "learning.budget: must be > 4, the samples of parents and peers, got 4",
+    ),
+    ("brain.type = 'modular'", "max_hidden: must be >= 60 .*max_parts = 30 .* got 10"),
+    (
+        "brain.type = 'modular'\nspace.max_hidden = 60\n[encoding]\ntype = 'cppn'",
+        "encoding.type: must be 'revolve-angle' with brain.type = 'modular', got 'cppn",
+    ),
     ("[environment]\nroughness_m = 0.1\npatch_m = 0.3", "extent_m: .* multiple of 0.3"),
     ("[environment]\nroughness_m = 0.1\npatch_m = 9", "extent_m: .* multiple of 9"),
     ("[environment]\nroughness_m = 0.1\npatch_m = 0.01", "patch_m: must be >= 2 env"),
