@@ -116,6 +116,10 @@ name = "pupils"
 births = 9
 {SHORT_EVALUATIONS}
 children = 4
+[space]
+max_hidden = 60
+[brain]
+type = "modular"
 [robust]
 draws = 1
 [learning]
@@ -127,14 +131,18 @@ population = 4
 [[islands]]
 [islands.learning]
 learner = "(1+1)-es"
-budget = 3
-inherit = "darwinian"
+budget = 5
+inherit = "samples"
+peers = 1
 parameters = {{}}
 [migration]
 topology = "ring"
 epoch = 5
 """
-"""Two off-line islands that learn in different ways, under a disturbance."""
+"""Two off-line islands that learn in different ways, under a disturbance.
+
+On the second one, children begin with brains of their parents and of a peer.
+"""
 
 MIXED = f"""
 name = "mixed"
@@ -147,6 +155,7 @@ births = 35
 [islands.learning]
 learner = "(1+1)-es"
 budget = 3
+peers = 1
 [migration]
 topology = "ring"
 epoch = 6

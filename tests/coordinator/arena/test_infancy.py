@@ -20,7 +20,7 @@ from coordinator.islands.events import (
 )
 from coordinator.run.learners import Learners
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Experiment
+from schema.experiment.document import BrainSection, Experiment, Space
 from schema.experiment.identity import Origin
 from schema.experiment.learning import Learning
 from schema.robot.brain import Brain
@@ -182,6 +182,33 @@ def test_a_batch_of_trials_is_tried_one_by_one() -> None:
     assert [each[2] for each in found] == [
         distinct_fitness(FIRST, step) for step in (3000, 5400, 7800, 10200, 12600)
     ]
+
+
+def test_an_infant_tries_the_brain_of_the_fittest_mature_robot() -> None:
+    """The first child is born at 60 s, when founder 14 is the fittest mature one."""
+    document = structs.replace(
+        learning(peers=1, budget=3),
+        brain=BrainSection(type="modular"),
+        space=Space(max_hidden=60),
+    )
+    run = life(document, lambda birth, _: birth.number / 100.0)
+    run.live(100)
+    child = BirthId(0, 15)
+    born = next(row for row in run.rows("births") if row["birth"] == child.number)
+    rows = [row for row in run.rows("learning") if row["birth"] == child.number]
+    start_s = born["sim_time_s"]
+    assert [(row["trial"], row["request"], row["sim_time_s"]) for row in rows] == [
+        (0, 0, start_s + 15.0), (1, 0, start_s + 27.0), (2, 0, start_s + 39.0)
+    ]  # fmt: skip
+    founder = {"island": 0, "birth": 14}
+    assert [row["sample_of"] for row in rows] == [None, founder, None]
+    (ask,) = (
+        one for one in run.commands if isinstance(one, Ask) and one.birth == child
+    )
+    # Of equal fitness, the first trial is the best.
+    assert (ask.most, ask.told) == (1, ())
+    assert ask.start == tuple(rows[0]["parameters"])
+    assert ask.start != tuple(rows[1]["parameters"])
 
 
 def test_an_infant_that_diverges_has_a_failed_trial() -> None:

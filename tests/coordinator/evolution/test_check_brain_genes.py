@@ -9,7 +9,7 @@ from coordinator.evolution.check_encoding import check_brain_genes
 from coordinator.evolution.kinds import brain_kind
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError
-from schema.experiment.document import BrainSection, Experiment
+from schema.experiment.document import BrainSection, Experiment, Space
 from schema.experiment.kinds import Use
 from schema.parts import BUILT_IN
 from schema.robot.genome import walk

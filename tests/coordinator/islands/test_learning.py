@@ -1,5 +1,6 @@
 """Lifetime learning of an off-line island: events in, commands out."""
 
+from collections import deque
 from collections.abc import Iterator
 from itertools import cycle
 from math import log
@@ -27,6 +28,7 @@ from schema.experiment.document import (
     EncodingSection,
     Experiment,
     SelectionSection,
+    Space,
     body_space,
 )
 from schema.experiment.identity import Origin
@@ -36,7 +38,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.columns import ROWS
-from schema.wire.messages import Evaluate
+from schema.wire.messages import Breed, Evaluate
 from schema.wire.protobuf import decode_genome, decode_robot
 from tests.coordinator.breeding import bred
 from tests.coordinator.island_run import live, records, requests, rows
@@ -160,7 +162,7 @@ def test_the_best_trial_counts_and_is_inherited_or_not(
 @given(st.lists(st.integers(0, 40), min_size=1, max_size=20))
 @settings(max_examples=8, deadline=None)
 def test_rows_do_not_depend_on_the_order_of_answers(turns: list[int]) -> None:
-    experiment = learning(learner="(1+1)-es", budget=3)
+    experiment = learning(learner="(1+1)-es", inherit="samples", peers=1)
     shuffled, straight = lived(experiment, cycle(turns))[1], lived(experiment)[1]
     assert records(shuffled) == records(straight)
 
@@ -231,6 +233,102 @@ def test_nothing_to_learn_is_one_trial() -> None:
     ]
     # A single motor has no coupling.
     assert {*counts} == {1, 5}
+
+
+MODULAR: dict[str, Any] = {
+    "brain": BrainSection(type="modular"),
+    "space": Space(max_hidden=60),
+}
+"""Brains of which all robots have the same parameters, sensors of touch aside."""
+
+
+def by_birth(commands: list[IslandCommand]) -> dict[int, list[Any]]:
+    """Return the trials of each birth."""
+    found: dict[int, list[Any]] = {}
+    for row in rows(commands, "learning"):
+        found.setdefault(row["birth"], []).append(row)
+    return found
+
+
+@pytest.mark.parametrize("brain", ["network", "modular"])
+def test_a_child_tries_the_best_brains_of_its_parents_first(brain: str) -> None:
+    rules = learning(inherit="samples", budget=5, learner="(1+1)-es")
+    experiment = replace(rules, **(MODULAR if brain == "modular" else {}))
+    _, commands = lived(experiment)
+    trials, tried = by_birth(commands), 0
+    best = {
+        birth: max(own, key=lambda row: row["fitness"] or -1.0)["parameters"]
+        for birth, own in trials.items()
+    }
+    for born in rows(commands, "births"):
+        own = trials[born["birth"]]
+        parents = [each["birth"] for each in born["parents"]]
+        samples = [row for row in own if row["sample_of"]]
+        assert [row["trial"] for row in samples] == [*range(1, len(samples) + 1)]
+        of = [row["sample_of"]["birth"] for row in samples]
+        assert [row["request"] for row in own] == [0] * len(of) + [
+            *([0, 0, 1, 2, 3][: 5 - len(of)])
+        ]
+        # Two parents may have the same brain, or the one that the child has.
+        assert of == [each for each in parents if each in of]
+        for row, parent in zip(samples, of, strict=True):
+            common = {*row["parameters"]} & {*best[parent]}
+            least = 0.05 if brain == "network" else 0.5
+            assert len(common) > least * len(row["parameters"])
+        tried += len(of)
+    assert tried > 8
+    assert not any(row["sample_of"] for birth in range(6) for row in trials[birth])
+
+
+def test_a_learner_begins_at_the_best_of_birth_and_samples() -> None:
+    """By hand: of the trials 0 to 2, one of the two samples is the best."""
+    island = Island(replace(learning(inherit="samples", budget=4), **MODULAR), 1, 0)
+    learners = Learners({0: island.experiment}, Origin(seed=1))
+    waiting, asked = deque(requests(island.handle(Started()))), list[Ask]()
+    points: dict[int, tuple[float, ...]] = {}
+    assert island._learning is not None
+    read = island._learning.parameters.read
+    while waiting:
+        each = waiting.popleft()
+        if isinstance(each, Breed):
+            event: Any = bred(island, each)
+        elif isinstance(each, Ask):
+            event = learners.answer(each)
+            if each.birth.number == 6:
+                asked.append(each)
+        else:
+            fitness = {0: 0.2, 1: 0.5, 2: 0.3, 3: 0.4}[each.trial]
+            if each.birth.number == 6:
+                points[each.trial] = read(each.robot)
+            found = Evaluation(fitness, 0.1, 0.0, 12.0)
+            event = Evaluated(each.birth, found, PROVENANCE, each.trial)
+        waiting += requests(island.handle(event))
+    (ask,) = asked
+    assert len({*points.values()}) == 4
+    assert (ask.number, ask.most, ask.told) == (0, 1, ())
+    assert ask.start == pytest.approx(points[1], abs=1e-12)
+
+
+def test_peers_are_the_fittest_others_of_the_population() -> None:
+    experiment = replace(learning(peers=2, learner="random"), **MODULAR)
+    _, commands = lived(experiment)
+    trials = by_birth(commands)
+    fitness = {row["birth"]: row["fitness"] for row in rows(commands, "evaluations")}
+    first = [row["birth"] for row in rows(commands, "population") if row["births"] == 6]
+    # Where a trial has failed, another one counts: all founders have a fitness.
+    ranked = sorted(first, key=lambda birth: (-fitness[birth], birth))
+    for birth in range(6, 10):
+        of = [row["sample_of"]["birth"] for row in trials[birth] if row["sample_of"]]
+        assert of == ranked[:2]
+    rules = learning(peers=1, inherit="samples", budget=6, learner="random")
+    _, commands = lived(replace(rules, **MODULAR))
+    for born in rows(commands, "births")[6:]:
+        own = by_birth(commands)[born["birth"]]
+        of = [row["sample_of"]["birth"] for row in own if row["sample_of"]]
+        parents = [each["birth"] for each in born["parents"]]
+        assert of[:2] == parents
+        assert len(of) == 3
+        assert of[2] not in parents
 
 
 def test_own_encodings_without_from_robot_inherit_nothing() -> None:

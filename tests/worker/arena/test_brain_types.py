@@ -30,6 +30,14 @@ OSCILLATING: dict[str, tuple[ArenaSettings, Callable[[int], Neuron]]] = {
             "output", PHASE_OSCILLATOR, part, (1.0 + 0.1 * part, 0.3, 0.9, 0.5)
         ),
     ),
+    "modular": (
+        replace(
+            SETTINGS,
+            brain=BrainSection(type="modular"),
+            space=replace(SETTINGS.space, max_hidden=60),
+        ),
+        lambda part: Neuron("output", "ModuleNeuron", part, (0.1 * part,)),
+    ),
     "neurons": (
         replace(
             SETTINGS,
