@@ -11,7 +11,7 @@ one core; two are made side by side.
 
 import argparse
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import product
@@ -41,22 +41,17 @@ MAPPED = ("map-elites", 1)
 """Experiment and seed of the run whose map is a picture of the page."""
 AT_ONCE = 2
 Row = dict[str, Any]
-_writing = Lock()
+writing = Lock()
+"""Rows are written one after the other."""
 
 
-def planned(seeds: int = SEEDS) -> Iterator[tuple[str, int]]:
+def planned(
+    seeds: int = SEEDS, experiments: Iterable[str] = EXPERIMENTS
+) -> Iterator[tuple[str, int]]:
     """Yield experiment and seed of all runs, seed by seed."""
     yield from (
-        (name, seed) for seed, name in product(range(1, seeds + 1), EXPERIMENTS)
+        (name, seed) for seed, name in product(range(1, seeds + 1), experiments)
     )
-
-
-def missing(seeds: int, data: Path) -> list[tuple[str, int]]:
-    """Return the runs that have no row."""
-    kept = {
-        (row["experiment"], int(row["seed"])) for row in csv_rows(data / "runs.csv")
-    }
-    return [own for own in planned(seeds) if own not in kept]
 
 
 def experiment(name: str) -> rv.Experiment:
@@ -76,7 +71,7 @@ def make(own: tuple[str, int], *, births: int, place: Path, data: Path) -> None:
     names = {"experiment": name, "seed": seed}
     courses = course_rows(run, births)
     best = best_row(run, given)
-    with _writing:
+    with writing:
         for row in courses:
             append_csv(data / "courses.csv", names | row)
         if own == MAPPED and data == DATA:
@@ -119,17 +114,37 @@ def draw(run: rv.Run) -> None:
     draw_map({}, own, "m/s").savefig(PICTURES / "diversity-map.png", dpi=200)
 
 
-def main() -> None:
-    """Make the runs that are missing."""
-    parser = argparse.ArgumentParser(description=__doc__)
+def run_missing(
+    about: str | None,
+    experiments: Iterable[str],
+    births: int,
+    data: Path,
+    make: Callable[..., None],
+) -> None:
+    """Make the runs that are missing; flags of the command line change the defaults.
+
+    Args:
+        about: docstring of the study.
+        experiments: their names.
+        births: births of each run.
+        data: folder of the rows; ``runs.csv`` has one for each run that is made.
+        make: makes a run, given its experiment and seed, ``births``, a ``place`` for
+            its folder, and ``data``.
+    """
+    parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--missing", action="store_true")
     parser.add_argument("--seeds", type=int, default=SEEDS)
-    parser.add_argument("--births", type=int, default=BIRTHS)
-    parser.add_argument("--data", type=Path, default=DATA)
+    parser.add_argument("--births", type=int, default=births)
+    parser.add_argument("--data", type=Path, default=data)
     options = parser.parse_args()
-    runs = missing(options.seeds, options.data)
+    plan = [*planned(options.seeds, experiments)]
+    kept = {
+        (row["experiment"], int(row["seed"]))
+        for row in csv_rows(options.data / "runs.csv")
+    }
+    runs = [own for own in plan if own not in kept]
     if options.missing:
-        print(f"{len(runs)} of {len([*planned(options.seeds)])} runs are missing")
+        print(f"{len(runs)} of {len(plan)} runs are missing")
         return
     with TemporaryDirectory() as place, ThreadPoolExecutor(AT_ONCE) as pool:
         one = partial(make, births=options.births, place=Path(place), data=options.data)
@@ -138,4 +153,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_missing(__doc__, EXPERIMENTS, BIRTHS, DATA, make)
