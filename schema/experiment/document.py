@@ -144,8 +144,8 @@ class Variation(Section, frozen=True):
             are added, on average.
         body_epsilon: step size of the parameters of parts, as a share of the way to a
             random value.
-        brain_epsilon: step size of the parameters of neurons, of ``cpg`` brains also
-            of weights, as a share of the way to a random value.
+        brain_epsilon: step size of the parameters of neurons, of ``cpg`` and
+            ``modular`` brains also of weights, as a share of the way to a random value.
     """
 
     p_delete_subtree: Probability = 0.05
