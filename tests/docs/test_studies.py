@@ -49,7 +49,7 @@ from tests.analysis.drawn import table
 from tests.docs.page_runner import blocks_of
 
 STUDIES = ("ablation", "arena_settings", "diversity.results", "ecosystem.results",
-           "equal_evaluations", "learners", "suite", "tasks",
+           "equal_evaluations", "learners", "learning.results", "suite", "tasks",
            "thesis.results")  # fmt: skip
 BIRTHS, MARK, COMMIT = 30, 15, "0123abc"
 OFF_LINE = """
