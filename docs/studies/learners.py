@@ -37,7 +37,6 @@ from docs.studies.pages import (
     markdown,
 )
 from schema.errors import FitnessUndefined, SimulationDiverged
-from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Vetting, body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.learning import Learning
@@ -111,18 +110,15 @@ def search(
         seed: of the search.
         budget: number of trials.
     """
-    kinds = neuron_kinds(EXPERIMENT.brain, EXPERIMENT.space)
-    parameters = BrainParameters(rules, kinds)
-    start = parameters.read(robot.brain)
+    parameters = BrainParameters(rules, EXPERIMENT.brain, EXPERIMENT.space)
+    start = parameters.read(robot)
     own = NewbornLearner(rules, start)
     found, begin = [fitness_of(robot)], 0
     points: Points = (start,)
     while len(found) < budget:
         rng = stream(seed, 0, name, len(found), Purpose.LEARNING)
         new = own.ask(rng, budget - len(found))
-        for each in new:
-            brain = parameters.written(robot.brain, each)
-            found.append(fitness_of(Robot(robot.parts, brain)))
+        found += [fitness_of(parameters.written(robot, each)) for each in new]
         points += new
         batch: Batch = (points[begin:], tuple(found[begin:]))
         own.tell(batch)
