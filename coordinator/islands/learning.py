@@ -262,7 +262,8 @@ class NewbornLearning:
             "platform": outcome.provenance.platform,
             "sim_time_s": None,
             "robot": None,
-            "sample_of": sample and {"island": sample.island, "birth": sample.number},
+            "sample_island": sample and sample.island,
+            "sample_birth": sample and sample.number,
         }
         return Record("learning", row)
 

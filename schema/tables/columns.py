@@ -336,11 +336,12 @@ LEARNING = _table(
         "null in its other trials, and off-line, where births has it",
     ),
     _nullable(
-        "sample_of",
-        PARENT,
-        "birth of the parent or peer whose brain this trial has, as far as the bodies "
-        "have parts in common; null in other trials",
+        "sample_island",
+        pa.int32(),
+        "island where the robot was born whose brain this trial has, a parent or peer, "
+        "as far as the bodies have parts in common; null in other trials",
     ),
+    _nullable("sample_birth", pa.int64(), "number of the birth of that robot"),
 )
 POPULATION = _table(
     "population",

@@ -200,8 +200,8 @@ def test_an_infant_tries_the_brain_of_the_fittest_mature_robot() -> None:
     assert [(row["trial"], row["request"], row["sim_time_s"]) for row in rows] == [
         (0, 0, start_s + 15.0), (1, 0, start_s + 27.0), (2, 0, start_s + 39.0)
     ]  # fmt: skip
-    founder = {"island": 0, "birth": 14}
-    assert [row["sample_of"] for row in rows] == [None, founder, None]
+    assert [row["sample_birth"] for row in rows] == [None, 14, None]
+    assert [row["sample_island"] for row in rows] == [None, 0, None]
     (ask,) = (
         one for one in run.commands if isinstance(one, Ask) and one.birth == child
     )

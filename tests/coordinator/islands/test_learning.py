@@ -250,6 +250,11 @@ def by_birth(commands: list[IslandCommand]) -> dict[int, list[Any]]:
     return found
 
 
+def samples_of(trials: list[Any]) -> list[Any]:
+    """Return the trials of brains of other robots."""
+    return [row for row in trials if row["sample_birth"] is not None]
+
+
 @pytest.mark.parametrize("brain", ["network", "modular"])
 def test_a_child_tries_the_best_brains_of_its_parents_first(brain: str) -> None:
     rules = learning(inherit="samples", budget=5, learner="(1+1)-es")
@@ -263,9 +268,9 @@ def test_a_child_tries_the_best_brains_of_its_parents_first(brain: str) -> None:
     for born in rows(commands, "births"):
         own = trials[born["birth"]]
         parents = [each["birth"] for each in born["parents"]]
-        samples = [row for row in own if row["sample_of"]]
+        samples = samples_of(own)
         assert [row["trial"] for row in samples] == [*range(1, len(samples) + 1)]
-        of = [row["sample_of"]["birth"] for row in samples]
+        of = [row["sample_birth"] for row in samples]
         assert [row["request"] for row in own] == [0] * len(of) + [
             *([0, 0, 1, 2, 3][: 5 - len(of)])
         ]
@@ -277,7 +282,7 @@ def test_a_child_tries_the_best_brains_of_its_parents_first(brain: str) -> None:
             assert len(common) > least * len(row["parameters"])
         tried += len(of)
     assert tried > 8
-    assert not any(row["sample_of"] for birth in range(6) for row in trials[birth])
+    assert not any(samples_of(trials[birth]) for birth in range(6))
 
 
 def test_a_learner_begins_at_the_best_of_birth_and_samples() -> None:
@@ -318,13 +323,13 @@ def test_peers_are_the_fittest_others_of_the_population() -> None:
     # Where a trial has failed, another one counts: all founders have a fitness.
     ranked = sorted(first, key=lambda birth: (-fitness[birth], birth))
     for birth in range(6, 10):
-        of = [row["sample_of"]["birth"] for row in trials[birth] if row["sample_of"]]
+        of = [row["sample_birth"] for row in samples_of(trials[birth])]
         assert of == ranked[:2]
     rules = learning(peers=1, inherit="samples", budget=6, learner="random")
     _, commands = lived(replace(rules, **MODULAR))
     for born in rows(commands, "births")[6:]:
         own = by_birth(commands)[born["birth"]]
-        of = [row["sample_of"]["birth"] for row in own if row["sample_of"]]
+        of = [row["sample_birth"] for row in samples_of(own)]
         parents = [each["birth"] for each in born["parents"]]
         assert of[:2] == parents
         assert len(of) == 3
