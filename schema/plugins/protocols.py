@@ -575,10 +575,11 @@ class Learner(Protocol):
     """Learner of the brains of newborns, ``learning.learner``; runs in the coordinator.
 
     The experiment names a class. It is called once for each newborn, as
-    ``Class(start, sigma, parameters)``: the parameters of the newborn's brain, (N,);
-    the key ``learning.sigma``; and an instance of the msgspec Struct that the class has
-    as its attribute ``Parameters``, read from the table ``[learning.parameters]``; None
-    without it. All parameters are shares of their ranges, from 0 to 1.
+    ``Class(start, sigma, parameters)``: the parameters of the newborn's brain, or of
+    the best sample of its parents and peers, (N,); the key ``learning.sigma``; and an
+    instance of the msgspec Struct that the class has as its attribute ``Parameters``,
+    read from the table ``[learning.parameters]``; None without it. All parameters are
+    shares of their ranges, from 0 to 1.
 
     The run asks for points, evaluates all of them together, tells their fitness, and
     asks again until the budget is spent. Points are stored when they are asked for. A

@@ -152,7 +152,8 @@ class NewbornLearner:
     def __init__(self, rules: Learning, start: Sequence[float]) -> None:
         """Make the learner.
 
-        Its start are the parameters of the brain at birth, as shares of their ranges.
+        Its start are the parameters of the brain at birth or of the best sample, as
+        shares of their ranges.
 
         Raises:
             ExperimentError: as of ``learner_class``, or the class raises.
