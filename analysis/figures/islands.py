@@ -1,6 +1,7 @@
 """Figures of runs of several islands."""
 
 import math
+from itertools import islice
 
 import numpy as np
 import plotnine as p9
@@ -8,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.forms import NothingToDraw, Tables, fitness_panels, fitness_text
-from analysis.figures.look import LOOK, OTHERS, RAMP
+from analysis.figures.look import LOOK, RAMP
 from analysis.figures.style import (
     in_order,
     integer_breaks,
@@ -17,6 +18,7 @@ from analysis.figures.style import (
     lone_points,
     panel_grid,
     scales,
+    spare_colours,
     theme_of_size,
 )
 
@@ -40,14 +42,15 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     names = sorted(set(frame["island"]), key=int)
     heights = "free_y" if fitness_panels(tables) else "fixed"
     columns, rows = panel_grid(frame["experiment"].nunique(), 3)
-    hues = OTHERS * -(-len(names) // len(OTHERS))
     return (
         p9.ggplot(frame, p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
         + lone_points(frame, ["island", "line"])
         + p9.facet_wrap("experiment", labeller=label, scales=heights, ncol=columns)
         + p9.scale_colour_manual(
-            hues[: len(names)], limits=names, guide=legend(["island", *names])
+            list(islice(spare_colours(), len(names))),
+            limits=names,
+            guide=legend(["island", *names]),
         )
         + p9.expand_limits(y=0)
         + p9.labs(

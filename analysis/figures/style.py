@@ -65,11 +65,11 @@ def colours(experiments: Iterable[str]) -> dict[str, str]:
     Experiments of the thesis have the same colour in every figure of every report,
     unless the user chose others.
     """
-    paint, spare = {**THESIS, **LOOK.get().chosen}, _spare()
+    paint, spare = {**THESIS, **LOOK.get().chosen}, spare_colours()
     return {name: paint.get(name) or next(spare) for name in in_order(experiments)}
 
 
-def _spare() -> Iterator[str]:
+def spare_colours() -> Iterator[str]:
     """Yield different colours: those of ``OTHERS``, then hues all around the circle."""
     yield from OTHERS
     for number in count():

@@ -53,6 +53,19 @@ def test_each_island_has_a_line() -> None:
         fitness_by_island({**alone, "populations": table("populations", rows)})
 
 
+def test_lines_of_many_islands_have_different_colours() -> None:
+    rows = [
+        {"experiment": "ring", "folder": "f", "island": island, "births": births,
+         "fitness": births}
+        for island in range(12)
+        for births in (15, 30)
+    ]  # fmt: skip
+    runs = table("runs", [{"folder": "f", "islands": 12}])
+    tables = {"runs": runs, "populations": table("populations", rows)}
+    lines = fitness_by_island(tables).draw().axes[0].lines
+    assert len({str(line.get_color()) for line in lines}) == len(lines) == 12
+
+
 def test_within_and_between_islands_are_means_over_runs() -> None:
     rows = [
         {"experiment": "ring", "births": 15, "within": within, "between": between}
