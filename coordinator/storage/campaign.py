@@ -21,7 +21,7 @@ from msgspec.structs import replace
 
 from coordinator.storage.disk import replace_bytes, replace_text
 from coordinator.storage.folder import forget_plugins, holds_run
-from coordinator.storage.hints import command
+from coordinator.storage.hints import command, resume_command
 from schema.errors import ExperimentError, RunFolderError, naming
 from schema.experiment.document import Experiment
 from schema.experiment.file import (
@@ -188,7 +188,7 @@ def refuse_used(folder: Path, wanted: Campaign) -> None:
         which, flags = _difference(folder, wanted)
         raise RunFolderError(
             f"{folder}: already holds {which}; to resume it: "
-            f"{command('resume', folder, *flags)}; or choose another folder"
+            f"{resume_command(folder, *flags)}; or choose another folder"
         )
     if holds_run(folder):
         raise RunFolderError(

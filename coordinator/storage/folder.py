@@ -22,7 +22,7 @@ from coordinator.storage.disk import (
     replace_text,
     storage_errors,
 )
-from coordinator.storage.hints import FLAGS, command
+from coordinator.storage.hints import FLAGS, command, resume_command
 from coordinator.storage.journal import (
     MOST_RECORDED_EPOCH,
     Position,
@@ -252,7 +252,7 @@ def _refuse_used(path: Path, wanted: RunDetails) -> None:
         which, births = _difference(path, wanted)
         raise RunFolderError(
             f"{path}: already holds {which}; to resume it: "
-            f"{command('resume', path, *births)}; or choose another folder"
+            f"{resume_command(path, *births)}; or choose another folder"
         )
     _refuse_foreign(path)
 

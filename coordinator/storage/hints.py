@@ -29,13 +29,13 @@ def keep_flags(folder: Path, flags: Sequence[str]) -> None:
     replace_text(folder / FLAGS, "".join(f"{word}\n" for word in flags))
 
 
-def resume_command(folder: Path) -> str:
+def resume_command(folder: Path, *flags: str) -> str:
     """Return the command that resumes a run or campaign with the same agents.
 
-    Runs of earlier versions have kept no flags.
+    Runs of earlier versions have kept no flags; ``flags`` are further ones.
     """
     try:
         words = read_small(folder / FLAGS, _LONGEST).decode().splitlines()
     except (FileNotFoundError, RunFolderError, UnicodeDecodeError):
         words = []
-    return command("resume", folder, *map(printable_line, words))
+    return command("resume", folder, *map(printable_line, words), *flags)

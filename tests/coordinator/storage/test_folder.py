@@ -18,6 +18,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.storage.folder import RunFolder, read_details
+from coordinator.storage.hints import keep_flags
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
 from schema.agent.version import VERSION
@@ -151,6 +152,9 @@ def test_a_used_folder_is_refused_with_the_hint_of_other_settings(
     ):
         with pytest.raises(RunFolderError, match=why):
             RunFolder(tmp_path / "run", other)
+    keep_flags(tmp_path / "run", ["--workers", "0"])
+    with pytest.raises(RunFolderError, match=r"resume \S+/run --workers 0; or choose"):
+        RunFolder(tmp_path / "run", details)
     assert RunFolder(tmp_path / "run").epoch == 2
 
 
