@@ -52,6 +52,8 @@ def robot_from_yaml(
 BEST = "best.yaml"
 """Name of the file of the best robot of a run's last population, in its folder."""
 MJCF_ENDING = ".xml"
+_MOST_BEST = 4
+"""Most files of best robots that a message names."""
 _YAML = (".yaml", ".yml")
 _ROBOGEN = (".txt", ".json")
 _READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING, PACKED)
@@ -87,9 +89,9 @@ def check_file(path: Path) -> str:
         InvalidRobot: another ending, a folder, or a missing file.
     """
     if path.is_dir():
-        best = path / BEST
-        what = f"; the best robot of its last population is {best}"
-        hint = what if best.is_file() else ""
+        found = [path / BEST] if (path / BEST).is_file() else path.glob(f"*/{BEST}")
+        best = ", ".join(map(str, sorted(found)[:_MOST_BEST]))
+        hint = f"; the best robot of a run's last population is {best}" if best else ""
         raise InvalidRobot(f"{path}: must be the file of a robot, got a folder{hint}")
     ending = _ending(path, _READ)
     try:
