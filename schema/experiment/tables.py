@@ -18,6 +18,8 @@ from schema.plugins.parameters import read_parameters
 
 Tables = dict[str, Any]
 """Tables of a TOML text."""
+_FLAGS = ("seed", "repeats", "workers", "out")
+"""Flags that are easily mistaken for keys."""
 
 
 def converted(tables: Tables, where: str) -> Experiment:
@@ -32,6 +34,9 @@ def converted(tables: Tables, where: str) -> Experiment:
     """
     if problem := settings_problem(tables):
         raise ExperimentError(f"{where}: {problem}")
+    if flag := next((key for key in _FLAGS if key in tables), ""):
+        why = f"is a flag of revolve run, --{flag}, not a key of an experiment"
+        raise ExperimentError(f"{where}: {flag}: {why}")
     _read_calibration(tables, where)
     _read_scenery(tables, where)
     _anchor_founders(tables, Path(where).parent.absolute())

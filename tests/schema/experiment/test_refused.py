@@ -11,6 +11,7 @@ VALUES = [
     ("[space]\nmax_part = 9", r"space.max_part: .* 'max_parts'\?; allowed: part_"),
     ("[selektion]\nwindow = 1", "did you mean 'selection'"),
     ("zzzz = 1", "zzzz: no such key; allowed: name, births"),
+    ("seed = 4", "test.toml: seed: is a flag of revolve run, --seed, not a key"),
     ('births = "many"', r"births: must be a whole number, got 'many'"),
     ("births = 0", r"births: .*>= 1.*, got 0"),
     ("births = 2.5", "births: "),
