@@ -98,8 +98,8 @@ def _read(
     )
     if found is not None and found.arena is not None:
         tell(
-            "simulated alone; in an arena, fitness is that of a window of a robot's "
-            "life among other robots"
+            "simulated alone; in an arena, robots are dropped at birth, and fitness "
+            "is that of a window of their life among others"
         )
     draws = (
         settings.simulation.sensor_noise,
