@@ -1,4 +1,4 @@
-"""Exchange of one group of islands with the others: whom to ask, and what to answer.
+"""Exchange of one group of islands with the others: its requests and its answers.
 
 A group asks each neighbouring group for all that its islands need of it: when the other
 has news, and at intervals, as announcements may be lost. A request that needs nothing

@@ -111,7 +111,7 @@ class IslandMigration:
     def _settle(
         self, population: Sequence[Individual], immigrants: Iterable[Individual]
     ) -> tuple[Individual, ...]:
-        """Return the population with all immigrants for whom the island has room."""
+        """Return the population with all immigrants that the island has room for."""
         if self._breeder is not None:
             arrived = sorted(immigrants, key=lambda one: one.birth)
             epoch = BirthId(self.epochs.island, self.epochs.epoch)

@@ -95,7 +95,7 @@ def permissions(certificate: Certificate) -> list[Permission]:
             ),
             Permission("egress", _SERVE, ("revolve/*/w/**", "revolve/*/an/**")),
             Permission("egress", ("query", "put", "delete"), (own,)),
-            # Groups of islands: any coordinator may ask, and decides whom it answers.
+            # Groups of islands: any coordinator may ask, and each checks requests.
             Permission("ingress", ("query",), migrants),
             Permission("egress", ("query", "reply", "declare_queryable"), migrants),
             Permission("ingress", ("declare_subscriber",), announced),

@@ -450,7 +450,7 @@ def test_replies_of_a_liar_end_each_of_its_jobs_once(network: Network) -> None:
     peer = Member("default", "worker", "x")
     replies = (
         encode([Reply(1, b"first")]),
-        encode([Reply(1, b"second"), Reply(7, b"nobody's"), Reply(2, reason="no")]),
+        encode([Reply(1, b"second"), Reply(7, b"of no job"), Reply(2, reason="no")]),
         b"malformed",
         encode([Reply(0, b"beyond the number of jobs")]),
     )
