@@ -127,6 +127,11 @@ def _explain(message: str, key: str, value: Any, kind: Any) -> str:  # noqa: ANN
     choices = get_args(kind) if get_origin(kind) is Literal else ()
     if choices:
         wanted = f"must be one of {', '.join(map(repr, choices))}"
+    if wanted == "must be a list":
+        # Also of ``tuple[float, float] | None``.
+        pairs = [each for each in (kind, *get_args(kind)) if get_origin(each) is tuple]
+        if pairs and Ellipsis not in (words := get_args(pairs[0])):
+            wanted += f" of length {len(words)}"
     return f"{key}: {wanted}, got {shown(value)}{nearest(value, choices)}"
 
 
