@@ -6,7 +6,6 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pyarrow as pa
@@ -34,6 +33,7 @@ from analysis.render.picture import Simulate
 from analysis.report.page import report
 from analysis.summary import show
 from schema.agent.supervisor import cores
+from schema.agent.version import installed
 from schema.errors import RevolveError, counted, shown
 from schema.tables.description import check_folder, make_folder
 
@@ -172,9 +172,5 @@ def _listed(figures: Sequence[DrawnFigure], formats: Sequence[str]) -> str:
 
 def _versions() -> dict[str, str]:
     versions = {"python": platform.python_version(), "system": platform.platform()}
-    for name in _LIBRARIES:
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed as a package"
-    return versions
+    missing = "not installed as a package"
+    return versions | {name: installed(name) or missing for name in _LIBRARIES}

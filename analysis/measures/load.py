@@ -56,9 +56,9 @@ def island_settings(island: int, islands: Sequence[Experiment]) -> Experiment:
     return islands[min(island, len(islands) - 1)]
 
 
-def has_rules(islands: Sequence[Experiment]) -> bool:
+def has_rules(island: Experiment) -> bool:
     """Return whether an island is an arena with other rules than the thesis's."""
-    return any(one.arena and one.arena.rules != "thesis" for one in islands)
+    return island.arena is not None and island.arena.rules != "thesis"
 
 
 def records_touches(island: Experiment) -> bool:

@@ -4,7 +4,8 @@ Everything is a function of the run's own tables. A measure that needs a damaged
 is left out, with the reason; all others are measured.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -183,20 +184,14 @@ class _Measure(NamedTuple):
     Attributes:
         compute: returns the table without the columns that name the run.
         needs: tables of the run, as words.
-        applies: whether a run with these islands has it.
+        applies: whether a run with such an island has it; None: every run.
+        islands: least number of islands of a run that has it.
     """
 
     compute: Callable[[RunTables], pa.Table]
     needs: str
-    applies: Callable[[Sequence[Experiment]], bool] = lambda _: True
-
-
-def _learns(islands: Sequence[Experiment]) -> bool:
-    return any(island.learning for island in islands)
-
-
-def _is_divided(islands: Sequence[Experiment]) -> bool:
-    return len(islands) > 1
+    applies: Callable[[Experiment], object] | None = None
+    islands: int = 0
 
 
 _OF_ROBOTS = "births population evaluations fitness"
@@ -205,43 +200,31 @@ _OTHERS = {
     "extremities": _Measure(lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
     "families": _Measure(families, "births population"),
     "brains": _Measure(brains, "births"),
-    "variability": _Measure(
-        variability, "fitness", lambda islands: any(island.arena for island in islands)
-    ),
+    "variability": _Measure(variability, "fitness", attrgetter("arena")),
     "interactions": _Measure(
-        interactions,
-        "births fitness deaths touches",
-        lambda islands: any(map(records_touches, islands)),
+        interactions, "births fitness deaths touches", records_touches
     ),
-    "between": _Measure(mean_distances, "births population", _is_divided),
+    "between": _Measure(mean_distances, "births population", islands=2),
     "named_measures": _Measure(
-        named_measures,
-        _OF_ROBOTS,
-        lambda islands: any(island.measures.names for island in islands),
+        named_measures, _OF_ROBOTS, attrgetter("measures.names")
     ),
-    "cells": _Measure(
-        cells,
-        "births evaluations fitness",
-        lambda islands: any(island.grid for island in islands),
-    ),
-    "fronts": _Measure(
-        fronts,
-        "births evaluations",
-        lambda islands: any(map(objectives_of, islands)),
-    ),
+    "cells": _Measure(cells, "births evaluations fitness", attrgetter("grid")),
+    "fronts": _Measure(fronts, "births evaluations", objectives_of),
     "changes": _Measure(
-        season_changes,
-        "births population fitness",
-        lambda islands: any(island.changes for island in islands),
+        season_changes, "births population fitness", attrgetter("changes")
     ),
-    "learning": _Measure(learning, "births population learning deaths", _learns),
-    "learning_curves": _Measure(learning_curves, "births learning", _learns),
+    "learning": _Measure(
+        learning, "births population learning deaths", attrgetter("learning")
+    ),
+    "learning_curves": _Measure(
+        learning_curves, "births learning", attrgetter("learning")
+    ),
     "life_courses": _Measure(life_courses, "births fitness", has_rules),
     "lifespans": _Measure(lifespans, "births deaths", has_rules),
     "birth_places": _Measure(birth_places, "births", has_rules),
     "couples": _Measure(couples, "births matings", has_rules),
     "patch_means": _Measure(patch_means, "patches", has_rules),
-    "migrants": _Measure(migrants, "births population migrations", _is_divided),
+    "migrants": _Measure(migrants, "births population migrations", islands=2),
 }
 """Measures other than those of populations."""
 
@@ -261,8 +244,10 @@ def measure(
     """
     measures = {}
     measures["populations"], problems = populations(run)
-    for name, (compute, needs, applies) in _OTHERS.items():
-        if not applies(run.islands):
+    for name, (compute, needs, applies, islands) in _OTHERS.items():
+        if len(run.islands) < islands or (
+            applies is not None and not any(map(applies, run.islands))
+        ):
             continue
         missing = [table for table in needs.split() if table in unread]
         if missing:

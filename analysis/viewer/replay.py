@@ -75,7 +75,7 @@ def read_news(run: LoadedRun) -> Update:
         samples=tuple(
             read_samples(
                 (name, row)
-                for name in (SAMPLED if has_rules(run.islands) else ())
+                for name in (SAMPLED if any(map(has_rules, run.islands)) else ())
                 for row in read_table(folder, name).to_pylist()
             )
         ),

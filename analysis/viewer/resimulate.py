@@ -7,7 +7,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -36,20 +35,8 @@ _TRACK = ("sim_time_s", "x", "y", "z", "qw", "qx", "qy", "qz", "angles")
 _COMPARED = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
 
 
-class ReplayedStep(Protocol):
-    """One advance of a replayed arena; see ``worker.arena.replay``."""
-
-    @property
-    def is_equal(self) -> bool:
-        """Whether its state equals the recorded one."""
-
-    @property
-    def samples(self) -> pa.Table:
-        """Poses at the recorded times."""
-
-    @property
-    def motion(self) -> pa.Table:
-        """Poses of the selected robots, at every tick."""
+Replayed = tuple[bool, pa.Table, pa.Table]
+"""Whether an advance ends as recorded, poses at the recorded times, and motion."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +51,7 @@ class Simulators:
 
     alone: Callable[[Robot, EvaluationSettings, Identity], tuple[Evaluation, pa.Table]]
     history: Callable[[Path, int, float], tuple[bytes, Rebuild]]
-    together: Callable[[bytes, Rebuild, frozenset[BirthId]], Iterator[ReplayedStep]]
+    together: Callable[[bytes, Rebuild, frozenset[BirthId]], Iterator[Replayed]]
 
 
 def resimulate(
@@ -144,12 +131,12 @@ def _in_arena(
     samples, motion = [], []
     is_equal = True
     steps = simulators.together(settings, past, frozenset(recorded))
-    for number, step in enumerate(steps, start=1):
+    for number, (ends_equal, poses, moved) in enumerate(steps, start=1):
         report(number / len(past.history))
-        is_equal = is_equal and step.is_equal
-        samples.append(step.samples)
-        motion.append(step.motion)
-        times = step.samples["sim_time_s"]
+        is_equal = is_equal and ends_equal
+        samples.append(poses)
+        motion.append(moved)
+        times = poses["sim_time_s"]
         if len(times) and pc.max(times).as_py() >= span["max"]:
             break
     replayed, frames = pa.concat_tables(samples), pa.concat_tables(motion)

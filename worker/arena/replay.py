@@ -6,7 +6,6 @@ approximation.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -26,22 +25,6 @@ from worker.arena.changes import possible
 from worker.arena.world import World
 from worker.clusters.states import Schedule
 from worker.robot.evaluation import evaluate, simulate
-
-
-@dataclass(frozen=True, slots=True)
-class ReplayedAdvance:
-    """One advance of a replayed arena.
-
-    Attributes:
-        is_equal: whether the state there has the recorded digest.
-        samples: poses of all robots that the advance records.
-        motion: poses of the chosen robots at every tick of the controllers.
-    """
-
-    step: int
-    is_equal: bool
-    samples: pa.Table
-    motion: pa.Table
 
 
 def alone(
@@ -74,21 +57,18 @@ def alone(
 
 
 def together(
-    settings: bytes, past: Rebuild, births: frozenset[BirthId], threads: int = 1
-) -> Iterator[ReplayedAdvance]:
+    settings: bytes, past: Rebuild, births: frozenset[BirthId]
+) -> Iterator[tuple[bool, pa.Table, pa.Table]]:
     """Replay an arena, whose settings are JSON, from a state advance by advance.
 
-    The motion is that of the robots of some births.
+    Yields whether the state after an advance has the recorded digest, the poses of all
+    robots that the advance records, and those of some births at every tick.
 
     Raises:
         MalformedMessage: a snapshot of other settings.
     """
     own = read_arena_settings(settings)
-    world = (
-        World.restore(own, past.snapshot, threads)
-        if past.snapshot
-        else World(own, threads)
-    )
+    world = World.restore(own, past.snapshot) if past.snapshot else World(own)
     tick, next_tick = own.simulation.brain_steps, Schedule(own).next_tick
     try:
         for advance in past.history:
@@ -104,12 +84,8 @@ def together(
             samples = PoseArrays.received(poses).rows()
             if is_shown:
                 motion.append(_motion(world, births))
-            yield ReplayedAdvance(
-                world.step,
-                world.digest() == advance.digest,
-                samples,
-                pa.concat_tables(motion),
-            )
+            is_equal = world.digest() == advance.digest
+            yield is_equal, samples, pa.concat_tables(motion)
     finally:
         world.close()
 

@@ -1,8 +1,11 @@
 """Replay of arenas: equal to the original, or reported as different."""
 
 from collections.abc import Callable, Sequence
+from itertools import starmap
+from typing import NamedTuple
 
 import msgspec
+import pyarrow as pa
 from msgspec.structs import replace
 
 from schema.experiment.document import Fitness, Simulation
@@ -15,7 +18,7 @@ from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion, PastAdvance, Rebuild
 from tests.worker.arena_cases import crowd, settings_of
 from tests.worker.evaluations import with_simulation
-from worker.arena.replay import ReplayedAdvance, alone, together
+from worker.arena.replay import alone, together
 from worker.arena.world import World
 
 Robots = Callable[[int], Robot]
@@ -37,12 +40,18 @@ def lived(
     return tuple(history)
 
 
+class Scene(NamedTuple):
+    is_equal: bool
+    samples: pa.Table
+    motion: pa.Table
+
+
 def scenes(
     history: Sequence[PastAdvance], birth: BirthId, settings: bytes = SETTINGS
-) -> list[ReplayedAdvance]:
+) -> list[Scene]:
     past = Rebuild(b"", tuple(history))
-    found = list(together(settings, past, frozenset({birth})))
-    assert [scene.step for scene in found] == [past.until for past in history]
+    found = list(starmap(Scene, together(settings, past, frozenset({birth}))))
+    assert len(found) == len(history)
     return found
 
 
