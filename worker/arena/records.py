@@ -33,7 +33,9 @@ class Samples:
             places = [one.place for one in self._population.robots]
             number = self._population.robot_rows.rows[robot.birth]
             neighbours = self._neighbours(places)[number]
-            row = robot.view.row(robot.body.channels, neighbours, robot.outputs)
+            view, channels = robot.view, robot.body.channels
+            readings = view.sensors.readings
+            row = view.row(channels, neighbours, robot.outputs, readings)
         robot.window.add(step, robot.place, row)
 
     def add(self, step: int, state: Floats) -> None:

@@ -18,9 +18,8 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import Floats
-from worker.clusters.engine_view import EngineView
 from worker.robot.placed import contact_reader
-from worker.robot.recording import probed_channels, step_with
+from worker.robot.recording import EngineView, probed_channels, step_with
 
 NEVER = 1 << 62
 """A moment later than all others."""

@@ -28,10 +28,9 @@ from worker.filters.filters import (
 from worker.measures import functions_of
 from worker.robot.banks import GuardedBank, broken_rows
 from worker.robot.brains import SoloNetwork, controls_of, solo_brain
-from worker.robot.devices import Sensors, Servos
 from worker.robot.own_sensors import Surroundings
-from worker.robot.placed import PlacedRobot, silence_engine, warning_names
-from worker.robot.recording import Channels, Probe, probed_channels, step_with
+from worker.robot.placed import silence_engine, warning_names
+from worker.robot.recording import Channels, EngineView, probed_channels, step_with
 
 Watch = Callable[[mujoco.MjData], None]
 
@@ -84,29 +83,26 @@ class ControlLoop:
             raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
         self.data = data = mujoco.MjData(self.model)
         self._core, self._velocities = data.qpos[:3].data, data.qvel.data
-        self._placed = placed = PlacedRobot(robot, space, self.model, data)
-        self._start_control(placed)
+        self._view = EngineView(robot, self.model, data, settings)
+        self._has_work = "energy" in probed_channels(settings)
+        self._start_control()
         self._filters = None
         if has_filters(settings):
             state = self.model, data
             self._filters = filters_of(robot, settings, identity, state, means)
-        self._channels, self._probe, self._has_work = None, None, False
+        self._channels = None
         if functions_of(settings).channels:
-            self._channels = Channels(placed, settings)
-            if probed := probed_channels(settings):
-                self._probe, self._has_work = Probe(placed), "energy" in probed
+            self._channels = Channels(self._view, settings)
         self._positions: list[float] = []
         self._rows: list[Floats] = []
         self._undisturbed: Floats = self._inputs
         self.now, self._next_sample = 0, self._clock.warmup_steps
         self._tick, self._is_unread, self.done = 0, True, False
 
-    def _start_control(self, placed: PlacedRobot) -> None:
-        """Find sensors and motors, and start the brain."""
+    def _start_control(self) -> None:
+        """Start the brain."""
         settings, brain = self._settings, self._robot.brain
-        width, has_light = settings.space.max_inputs, self._light is not None
-        self._sensors = Sensors(placed, width=width, has_light=has_light)
-        self._servos = Servos(placed)
+        self._sensors = self._view.sensors
         ticks = self._end // self._tick_steps + 1
         self._brain = solo_brain(controls_of(settings), brain, ticks)
         if isinstance(self._brain, SoloNetwork):
@@ -158,7 +154,7 @@ class ControlLoop:
         self._outputs = outputs
         if self._filters:
             outputs = filtered_outputs(self._filters, self._tick, outputs)
-        self._servos.drive(outputs[0])
+        self._view.servos.drive(outputs[0])
         if self.watch is not None:
             self.watch(self.data)
         self._tick += 1
@@ -176,7 +172,7 @@ class ControlLoop:
         interval_s = self._clock.pose_steps * self._clock.timestep_s
         positions = np.array(self._positions).reshape(-1, 3)
         if self._channels is None:
-            return Trace(interval_s, positions, self._placed.constants(self._settings))
+            return Trace(interval_s, positions, self._view.constants(self._settings))
         return self._channels.trace(self._robot, interval_s, positions, self._rows)
 
     def _think(self) -> Floats:
@@ -191,14 +187,14 @@ class ControlLoop:
 
     def _step_to(self, until: int) -> None:
         """Step the physics with constant commands; sample on the way."""
-        model, data = self.model, self.data
+        model, data, probe = self.model, self.data, self._view.probe
         while self.now < until:
             if self.now == self._next_sample:
                 # After the tick, as in an arena: a sample has the readings of its step.
                 self._sample()
             stop = min(until, self._next_sample)
-            if self._probe is not None and self._has_work:
-                step_with([self._probe], model, data, stop - self.now)
+            if probe is not None and self._has_work:
+                step_with([probe], model, data, stop - self.now)
             else:
                 mujoco.mj_step(model, data, stop - self.now)
             self.now = stop
@@ -207,16 +203,9 @@ class ControlLoop:
         self._positions += self._core.tolist()
         self._next_sample += self._clock.pose_steps
         if self._channels is not None:
-            row = self._channels.row(
-                self.data.qpos[self._placed.joints],
-                self.data.qvel[self._placed.dofs],
-                probe=None if self._probe is None else self._probe.read(),
-                readings=self._undisturbed,
-                neighbours=0,
-                outputs=self._outputs[0],
-                commands=self.data.ctrl[self._servos.actuators],
+            self._rows.append(
+                self._view.row(self._channels, 0, self._outputs[0], self._undisturbed)
             )
-            self._rows.append(row)
 
     def _finish(self) -> None:
         """Add the last sample; its readings are those of the last tick, as in an arena.
