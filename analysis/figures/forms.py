@@ -287,16 +287,11 @@ def _last_robots(tables: Tables) -> pa.Table:
     if populations is None or "folder" not in robots.column_names:
         return robots
     keys = ["folder", "island"]
-    ends = populations.group_by(keys).aggregate([("births", "max")]).to_pylist()
-    outcomes = tables["outcomes"].select(["folder", "births"]).to_pylist()
-    births = {row["folder"]: row["births"] for row in outcomes}
-    equal = {
-        (row["folder"], row["island"])
-        for row in ends
-        if row["births_max"] <= births.get(row["folder"], -1)
-    }
-    homes = zip(*(robots[key].to_pylist() for key in keys), strict=True)
-    return robots.filter(pa.array([home in equal for home in homes], pa.bool_()))
+    ends = populations.group_by(keys).aggregate([("births", "max")])
+    runs = tables["outcomes"].select(["folder", "births"])
+    ended = ends.join(runs, "folder", join_type="inner")
+    equal = ended.filter(pc.field("births_max") <= pc.field("births"))
+    return robots.join(equal.select(keys), keys, join_type="left semi")
 
 
 def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas

@@ -9,8 +9,8 @@ from analysis.measures.population_table import (
     Numbers,
     last_there,
     ratio,
-    residence_columns,
     residence_ids,
+    residence_islands,
 )
 from analysis.measures.run_tables import RunTables
 from schema.robot.trees import Integers
@@ -33,7 +33,7 @@ def interactions(run: RunTables) -> pa.Table:
     both = np.concatenate([first, second])
     time = np.tile(np.asarray(touches["duration_s"], np.float64), 2)
     ids = (robots, both, pairs[:, 0])
-    homes, at, by = (np.asarray(residence_columns(each)["island"]) for each in ids)
+    homes, at, by = map(residence_islands, ids)
     rows = []
     for island in np.unique(homes).tolist():
         here = homes == island
@@ -59,7 +59,7 @@ def _lives(run: RunTables) -> tuple[Integers, Numbers]:
     events = (natives, run.tables["fitness"], run.tables["deaths"])
     ids = np.concatenate([residence_ids(each) for each in events])
     times = np.concatenate([np.asarray(each["sim_time_s"]) for each in events])
-    islands = np.asarray(residence_columns(ids)["island"])
+    islands = residence_islands(ids)
     # A native's first event is its birth, an immigrant's its first sample.
     alive = natives.num_rows + run.tables["fitness"].num_rows
     robots, firsts = np.unique(ids[:alive], return_index=True)

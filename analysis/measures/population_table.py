@@ -111,14 +111,9 @@ def last_there(table: pa.Table, times: Numbers | Integers) -> pa.Table:
     return table.take(pa.array(order[is_last_of_each(ids[order])]))
 
 
-def residence_columns(ids: Integers) -> dict[str, pa.Array]:
-    """Return the columns that ``residence_ids`` combines, by name."""
-    births = ids >> _BITS & 2 ** (_PLACE - _BITS) - 1
-    return {
-        "island": pa.array(ids >> _PLACE, pa.int32()),
-        "birth_island": pa.array(births, pa.int32()),
-        "birth": pa.array(ids & 2**_BITS - 1, pa.int64()),
-    }
+def residence_islands(ids: Integers) -> Integers:
+    """Return the ``island`` of ``residence_ids``, (N,)."""
+    return ids >> _PLACE
 
 
 def rows_of(wanted: Integers, births: pa.Table) -> Integers:
