@@ -141,16 +141,14 @@ class Probe:
             [N m or N], whether each part touches anything but the robot.
     """
 
-    def __init__(self, placed: PlacedRobot) -> None:
+    def __init__(self, placed: PlacedRobot, motors: slice) -> None:
         model, data, dofs = placed.model, placed.data, placed.dofs
         self._contacts = contact_reader(model, data)
         self._velocities = data.qvel
         self._timestep_s = float(model.opt.timestep)
         first = dofs.start + FREE_DOFS
-        driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
-        own = ((driven >= first) & (driven < dofs.stop)).nonzero()[0]
-        motors = slice(int(own[0]), int(own[-1]) + 1) if len(own) else slice(0, 0)
-        self._dofs: Indices = driven[motors].astype(np.intp)
+        driven = model.jnt_dofadr[model.actuator_trnid[motors, 0]]
+        self._dofs: Indices = driven.astype(np.intp)
         self._forces: Floats = data.actuator_force[motors]
         self._before: Floats = data.actuator_velocity[motors]
         self._slopes: Floats = model.actuator_biasprm[motors, 2].copy()
@@ -216,7 +214,9 @@ class EngineView(PlacedRobot):
         has_light = is_lit(settings.environment, arena)
         self.sensors = Sensors(self, width=width, has_light=has_light)
         self.servos = Servos(self)
-        self.probe = Probe(self) if probed_channels(settings) else None
+        self.probe = None
+        if probed_channels(settings):
+            self.probe = Probe(self, self.servos.actuators)
         self.qpos: Floats = data.qpos[self.joints]
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]

@@ -13,7 +13,7 @@ from schema.robot.robot import Part
 from schema.wire.arena import Insertion
 from tests.schema.robots import GREY, robot_of
 from tests.worker.arena_cases import populated, settings_of
-from worker.robot.devices import Sensors
+from worker.robot.devices import Sensors, Servos
 from worker.robot.placed import PlacedRobot
 from worker.robot.recording import Probe
 
@@ -37,7 +37,8 @@ def test_contacts_within_a_gap_do_not_count(
     data.qpos[0] = x
     sensors = Sensors(PlacedRobot(WITH_PADS, BUILT_IN, model, data), width=8)
     assert sensors.start()[0, 6:].tolist() == [touches, touches]
-    probe = Probe(PlacedRobot(WITH_PADS, BUILT_IN, model, data))
+    placed = PlacedRobot(WITH_PADS, BUILT_IN, model, data)
+    probe = Probe(placed, Servos(placed).actuators)
     probe.read()
     assert probe.numbers[-1] == touches
     settings = replace(settings_of(drop_m=0.0), environment=environment)

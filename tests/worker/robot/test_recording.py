@@ -207,7 +207,7 @@ def test_work_and_torque_follow_from_the_motion_of_a_flywheel(
     model = wheel(kv, limit)
     data = mujoco.MjData(model)
     data.ctrl[0] = 4.0
-    probe = Probe(PlacedRobot(turtle, BUILT_IN, model, data))
+    probe = Probe(PlacedRobot(turtle, BUILT_IN, model, data), slice(0, 1))
     work, speed, angle, torques = 0.0, 0.0, 0.0, []
     for _ in range(20):
         mujoco.mj_step(model, data)
