@@ -1,7 +1,6 @@
 """Filters between the sensors, brains and motors of robots: noise, faults, pushes."""
 
 from collections.abc import Iterable, Sequence
-from functools import lru_cache
 from typing import Protocol
 
 import mujoco
@@ -41,19 +40,6 @@ def filtered_outputs(filters: Iterable[Filter], tick: int, values: Floats) -> Fl
     for stage in filters:
         values = stage.outputs(tick, values)
     return values
-
-
-@lru_cache(maxsize=64)
-def has_filters(settings: EvaluationSettings) -> bool:
-    """Return whether any filter acts in the evaluations of some settings."""
-    clock = settings.simulation
-    return bool(
-        settings.calibration
-        or clock.sensor_noise
-        or clock.actuator_noise
-        or settings.ablation is not None
-        or settings.environment.push_impulse
-    )
 
 
 def filters_of(

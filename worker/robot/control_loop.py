@@ -23,7 +23,6 @@ from worker.filters.filters import (
     filtered_outputs,
     filtered_readings,
     filters_of,
-    has_filters,
 )
 from worker.measures import functions_of
 from worker.robot.banks import GuardedBank, broken_rows
@@ -86,10 +85,8 @@ class ControlLoop:
         self._view = EngineView(robot, self.model, data, settings)
         self._has_work = "energy" in probed_channels(settings)
         self._start_control()
-        self._filters = None
-        if has_filters(settings):
-            state = self.model, data
-            self._filters = filters_of(robot, settings, identity, state, means)
+        state = self.model, data
+        self._filters = filters_of(robot, settings, identity, state, means)
         self._channels = None
         if functions_of(settings).channels:
             self._channels = Channels(self._view, settings)
