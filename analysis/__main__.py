@@ -5,8 +5,8 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from analysis.extras import extra
 from analysis.render.flags import FILM_ENDINGS, PAGE_ENDING
+from schema.agent.extras import extra
 from schema.agent.flags import Flags
 from schema.plugins.permission import allow
 from schema.tables.description import check_folder
@@ -17,7 +17,7 @@ def main(arguments: list[str]) -> int:
 
     Raises:
         RunFolderError: no run is found.
-        MissingExtra: a library is not installed.
+        RevolveError: a library is not installed.
     """
     options = parser(arguments[0]).parse_args(arguments[1:])
     if arguments[0] == "robot render":

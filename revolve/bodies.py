@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from analysis.extras import extra
 from analyzer.report import analyze
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, checked, plain
+from schema.agent.extras import extra
 from schema.experiment.document import Vetting, island_experiment
 from schema.formats.files import settings_of, types_for
 from schema.robot.results import Report

@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
-from analysis.extras import extra
 from revolve.experiment import Experiment, document_of
 from revolve.robot import DEFAULT, Robot
 from revolve.simulation import Simulation
+from schema.agent.extras import extra
 from schema.errors import RevolveError
 from schema.experiment.document import island_experiment
 from schema.experiment.settings import FITNESS

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
-from analysis.extras import extra
 from analysis.render.stage import choose_engine
 from revolve.arguments import finite_numbers, in_order, picture_size, whole_number
 from revolve.evaluation import outside_of_runs, settings_for
 from revolve.experiment import Experiment
 from revolve.robot import Robot, checked
+from schema.agent.extras import extra
 from schema.agent.supervisor import cores
 from schema.errors import FAILURES, RevolveError
 from schema.experiment.brains import types_of

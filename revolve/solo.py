@@ -5,8 +5,8 @@ from contextlib import suppress
 
 import msgspec
 
-from analysis.extras import extra
 from revolve.messages import Outcome, Task, problem_of
+from schema.agent.extras import extra
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.plugins.permission import allow

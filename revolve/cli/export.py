@@ -8,8 +8,8 @@ import msgspec
 import pyarrow as pa
 from pyarrow import csv, parquet
 
-from analysis.extras import extra
 from revolve.campaign import Runs
+from schema.agent.extras import extra
 from schema.agent.flags import Flags
 from schema.agent.supervisor import cores
 from schema.errors import RevolveError, RunFolderError, counted

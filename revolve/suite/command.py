@@ -3,7 +3,7 @@
 import shlex
 from pathlib import Path
 
-from analysis.extras import extra
+from schema.agent.extras import extra
 from schema.agent.flags import Flags, add_count
 from schema.agent.stopping import advise
 from schema.agent.supervisor import cores, most_processes

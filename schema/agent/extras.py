@@ -1,12 +1,16 @@
-"""Advice on installing an extra of this package as the package itself is installed."""
+"""Extras of this package: what to do if a library is missing."""
 
 import shlex
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import Distribution, PackageNotFoundError, distribution
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import msgspec
+
+from schema.errors import RevolveError
 
 NAME = "revolve-islands"
 
@@ -19,6 +23,21 @@ class _Source(msgspec.Struct):
 
     url: str
     dir_info: dict[str, bool] | None = None
+
+
+@contextmanager
+def extra(what: str, name: str) -> Iterator[None]:
+    """Report a library that cannot be imported, with the extra that installs it.
+
+    ``what`` begins the message, such as ``pictures need``.
+
+    Raises:
+        RevolveError: a library is not installed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise RevolveError(f"{what} {error.name}: {install_advice(name)}") from None
 
 
 def install_advice(extra: str) -> str:
