@@ -19,7 +19,8 @@ _KINDS = {
     "saved": pa.bool_(),
 }
 _RUN = {"experiment": "name of the experiment", "folder": "path of the run folder"}
-_ISLAND = {**_RUN, "island": "number of the island", "births": "births there so far"}
+_HERE = {**_RUN, "island": "number of the island"}
+_ISLAND = {**_HERE, "births": "births there so far"}
 _ROBOT = {"birth_island": "island of birth", "birth": "number of birth there"}
 
 BODY = {
@@ -214,8 +215,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "variability": "fitness_range divided by population_range",
     },
     "interactions": {
-        **_RUN,
-        "island": "number of the island",
+        **_HERE,
         "robots": "robots that lived there",
         "lived_s": "sum of their lifetimes [s]",
         "pairs": "pairs of robots that ever touched",
@@ -251,8 +251,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "reached": "islands whose last population contains it or a descendant",
     },
     "cells": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         "cell": "bins of the grid's measures, from 0, such as 3/7",
         **_ROBOT,
         "fitness": "greatest fitness that a robot of the cell had",
@@ -260,8 +259,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "robots": "evaluations in the cell; on-line samples of fitness",
     },
     "fronts": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         **_ROBOT,
         "x_objective": "first objective of nsga2, and whether its max or min is sought",
         "y_objective": "second objective",
@@ -312,23 +310,20 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "high": "upper quartile",
     },
     "life_courses": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         "sim_time_s": "simulated time of a sample of fitness [s]",
         "living": "robots that live then",
         "energy": "mean of their store energy; null if they have none",
         "born": "births since the sample before",
     },
     "lifespans": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         **_ROBOT,
         "age_s": "age at death [s]",
         "reason": "reason of the death",
     },
     "birth_places": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         "birth": _ROBOT["birth"],
         "sim_time_s": "simulated time of the birth [s]",
         "x": "x of its place, world frame [m]",
@@ -336,8 +331,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "children": "number of its children",
     },
     "couples": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         "sim_time_s": "simulated time of the mating [s]",
         "birth": "number of birth of the child",
         "x": "x of the place near which the child was born; null if any [m]",
@@ -349,8 +343,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "related": "share of the parents and their ancestors that both have in common",
     },
     "patch_means": {
-        **_RUN,
-        "island": _ISLAND["island"],
+        **_HERE,
         "patch": "number of the patch",
         "x": "x of its centre [m]",
         "y": "y of its centre [m]",

@@ -6,7 +6,7 @@ from collections import Counter
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.diversity.fronts import added_volume, front
+from analysis.measures.diversity.objectives import added_volume, front
 from analysis.measures.diversity.samples import numbers
 from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import Numbers
