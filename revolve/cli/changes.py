@@ -50,7 +50,7 @@ class ReevaluationJob(NamedTuple):
     robot: Robot | PlainRobot
 
 
-def _reevaluated(jobs: Sequence[ReevaluationJob], workers: int) -> Iterator[Row]:
+def _reevaluated(jobs: Sequence[ReevaluationJob], workers: int | None) -> Iterator[Row]:
     """Yield a row for each job with columns, in their order; show progress.
 
     Equal evaluations are computed once.

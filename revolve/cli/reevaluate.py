@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
-from analysis.extras import extra
-from schema.agent.flags import Flags, add_count, add_plugins, whole_number
-from schema.agent.supervisor import cores, most_processes
+from schema.agent.extras import extra
+from schema.agent.flags import Flags, add_count, add_plugins
+from schema.agent.supervisor import most_processes
 from schema.plugins.permission import allow
 
 _ABLATE = "ablate"
@@ -57,14 +57,9 @@ def parser(command: str) -> Flags:
         metavar="FOLDER",
         help="folder to write to (default: %(default)s)",
     )
-    flags.add_argument(
-        "--workers",
-        type=whole_number(1, most_processes()),
-        default=cores(),
-        metavar="N",
-        help="number of workers, started on this machine; no result depends on it "
-        "(default: one per core)",
-    )
+    what = "number of workers, started on this machine; no result depends on it "
+    what += "(default: one per core)"
+    add_count(flags, "--workers", None, what, most=most_processes())
     add_plugins(flags)
     if command == _ABLATE:
         what = "number of robots, the fittest of the last populations"

@@ -4,7 +4,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import pyarrow as pa
 from msgspec.structs import replace
 
 from analysis.measures.load import read_run, read_tables
@@ -71,15 +70,17 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     table = robots(RunTables(tables, islands=run.islands))
     if not table.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
-    order, is_last = _fittest_first(table), table["is_last"].to_pylist()
-    last = set([row for row in order if is_last[row]][:most])
-    first = table.slice(order[0], 1).to_pylist()[0]
-    ever = individual(next(best_ever(folder), first))
+    rows = table.to_pylist()
+    # The fittest first, failed robots last.
+    keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
+    order = sorted(range(len(rows)), key=keys.__getitem__)
+    last = set([number for number in order if rows[number]["is_last"]][:most])
+    ever = individual(next(best_ever(folder), rows[order[0]]))
     own = OwnRun(folder)
     births = tables["births"]
     recorded = last_recorded(tables["evaluations"], tables["learning"])
     chosen: list[Chosen] = []
-    for number, row in enumerate(table.to_pylist()):
+    for number, row in enumerate(rows):
         name = BirthId(row["birth_island"], row["birth"])
         if not (number in last or name == ever):
             continue
@@ -120,10 +121,3 @@ def _seasons(
         )
         seasons[point] = replace(there, simulation=simulation)
     return seasons
-
-
-def _fittest_first(table: pa.Table) -> list[int]:
-    """Return the rows of robots by descending fitness, failed robots last."""
-    rows = table.to_pylist()
-    keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
-    return sorted(range(len(rows)), key=keys.__getitem__)
