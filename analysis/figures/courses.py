@@ -1,7 +1,7 @@
 """Courses of measures over births: runs, their mean, and its interval."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import plotnine as p9
@@ -114,7 +114,6 @@ def over_births(
         return values.assign(function=values["experiment"].map(functions))
 
     runs = frame(shown.by_run)
-    few = [name for name, size in shown.sizes.items() if 1 < size <= _FEW_RUNS]
     mean = frame(shown.mean)
     figure = p9.ggplot(mean, p9.aes("births", "mean"))
     sure = shown.mean.filter(pc.field("runs") >= SUMMARY_RUNS)
@@ -122,14 +121,7 @@ def over_births(
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
         # Not in the legend: the interval of some experiments is narrower than a line.
         figure += p9.geom_ribbon(ends, frame(sure), alpha=0.18, show_legend=False)
-    if few and heights is None:
-        figure += p9.geom_line(
-            p9.aes(colour="experiment", group="folder"),
-            data=runs[runs["experiment"].isin(few)],
-            size=0.35,
-            alpha=0.6,
-            show_legend=False,
-        )
+    figure += _single_runs(runs, shown.sizes) if heights is None else []
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
     figure += lone_points(mean, ["experiment"])
     figure += _change_marks(tables)
@@ -194,27 +186,28 @@ def changes_over_births(tables: Tables) -> p9.ggplot:
     stacked["panel"] = stacked["panel"].map(_CHANGES)
     runs = _mean(stacked, ["experiment", "folder", "panel", "births"])
     means = _mean(runs, ["experiment", "panel", "births"])
-    sizes = runs.groupby("experiment")["folder"].nunique()
-    few = sizes[(sizes > 1) & (sizes <= _FEW_RUNS)].index
-    figure = p9.ggplot(means, p9.aes("births", "value", colour="experiment"))
-    if len(few):
-        figure += p9.geom_line(
-            p9.aes(group="folder"),
-            data=runs[runs["experiment"].isin(few)],
-            size=0.35,
-            alpha=0.6,
-        )
+    sizes = runs.groupby("experiment")["folder"].nunique().to_dict()
     columns, lines = panel_grid(len(_CHANGES), 2)
     return (
-        figure
+        p9.ggplot(means, p9.aes("births", "value", colour="experiment"))
+        + _single_runs(runs, sizes)
         + p9.geom_line(size=0.9)
         + lone_points(means, ["experiment", "panel"])
         + p9.facet_wrap("panel", scales="free_y", ncol=columns)
-        + scales(tables, in_order(sizes.index), is_filled=False)
+        + scales(tables, sizes, is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x=f"births (means over {width})", y="change")
         + theme_of_size(0.4 + 3.0 * lines)
     )
+
+
+def _single_runs(runs: Any, sizes: Mapping[str, int]) -> list[Any]:  # noqa: ANN401 - pandas
+    """Return a layer of the runs of experiments that have a few; by numbers of runs."""
+    few = [name for name, size in sizes.items() if 1 < size <= _FEW_RUNS]
+    lines = p9.aes(colour="experiment", group="folder")
+    chosen = runs[runs["experiment"].isin(few)]
+    thin = p9.geom_line(lines, chosen, size=0.35, alpha=0.6, show_legend=False)
+    return [thin] if few else []
 
 
 def _mean(rows: Any, keys: list[str]) -> Any:  # noqa: ANN401 - pandas

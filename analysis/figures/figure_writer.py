@@ -21,7 +21,7 @@ from analysis.figures.robot_figures import (
     robot_pictures,
     tree_figures,
 )
-from analysis.figures.robot_pictures import RobotPicture
+from analysis.figures.robot_pictures import FILM_EVERY_S, RobotPicture
 from analysis.figures.style import file_name, in_order, label, save
 from analysis.figures.sweeps import sweep_caption, sweep_map
 from analysis.measures.load import LeftOut, LoadedRun
@@ -121,7 +121,7 @@ class FigureWriter:
         """Write the moving picture of a robot, and beside it its page."""
         stem = self._stem(f"{_FILM}{robot.best.experiment}")
         path = stem.with_name(f"{stem.name}.gif")
-        path.write_bytes(film(robot.film, robot.film_interval_s))
+        path.write_bytes(film(robot.film, FILM_EVERY_S))
         path.with_suffix(PAGE_ENDING).write_text(robot.page, "utf-8")
         return Film(robot.best, path)
 

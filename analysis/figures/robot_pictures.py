@@ -64,7 +64,6 @@ class RobotPicture:
         gait: consecutive pictures of the robot moving alone.
         times_s: time of each of these pictures [s].
         film: pictures of the same time, more of them.
-        film_interval_s: time between two of these pictures [s].
         moved_m: distance between the core's places in the first and last picture of
             the gait, in the ground plane [m].
         family: its nearest ancestors; None if they are not shown.
@@ -77,7 +76,6 @@ class RobotPicture:
     gait: tuple[Picture, ...]
     times_s: tuple[float, ...]
     film: tuple[Picture, ...]
-    film_interval_s: float
     moved_m: float
     family: Family | None
     pictures: Mapping[int, Picture]
@@ -167,12 +165,12 @@ def shown_experiment(run: LoadedRun) -> Experiment:
 
 def _motion(
     robot: Robot, settings: EvaluationSettings, poses: Sequence[Floats]
-) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float, float]:
+) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float]:
     """Return pictures from the middle of a robot's life on, by a fixed camera.
 
     Returns:
-        Pictures of the gait and their times [s]; pictures of the film and the time
-        between two of them [s]; the robot's way during the gait [m].
+        Pictures of the gait and their times [s]; pictures of the film; the robot's way
+        during the gait [m].
     """
     step = round(EVERY_S / FILM_EVERY_S)
     first = len(poses) // 2
@@ -190,7 +188,7 @@ def _motion(
 
     film = pictures(filmed, _FILMED)
     gait = pictures([poses[at] for at in chosen], _LARGE)
-    return gait, times_s, film, FILM_EVERY_S, _way_m(poses, chosen)
+    return gait, times_s, film, _way_m(poses, chosen)
 
 
 def _way_m(poses: Sequence[Floats], ticks: Sequence[int]) -> float:

@@ -5,13 +5,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from analysis.extras import extra
 from analysis.render.stage import Picture
+from schema.agent.extras import extra
 from schema.errors import RevolveError
 
 _CODECS = {
@@ -22,16 +21,6 @@ _CODECS = {
 _COLOURS = 256
 _SAMPLES = 6
 """Pictures from which the colours of a film are chosen."""
-
-
-class Pictures(Protocol):
-    """Pictures of one size by number, such as a list; at least one."""
-
-    def __len__(self) -> int: ...
-
-    def __getitem__(self, index: int, /) -> Picture: ...
-
-    def __iter__(self) -> Iterator[Picture]: ...
 
 
 class NoPictures(RevolveError):  # noqa: N818 - names what is missing
@@ -78,12 +67,12 @@ def save_picture(picture: Picture, path: Path) -> None:
         Image.fromarray(picture).save(path)
 
 
-def save_film(pictures: Pictures, path: Path, interval_s: float) -> None:
+def save_film(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
     """Write pictures of one size as a film, in the format of the file's ending.
 
     Raises:
         NoPictures: the file cannot be written.
-        MissingExtra: the encoder of MP4 and WebM is not installed.
+        RevolveError: the encoder of MP4 and WebM is not installed.
     """
     ending = path.suffix.lower()
     with writing(path):
@@ -93,7 +82,9 @@ def save_film(pictures: Pictures, path: Path, interval_s: float) -> None:
             path.write_bytes(gif(pictures, interval_s, _COLOURS))
 
 
-def _encode(pictures: Pictures, path: Path, interval_s: float, ending: str) -> None:
+def _encode(
+    pictures: Sequence[Picture], path: Path, interval_s: float, ending: str
+) -> None:
     with extra("films in MP4 and WebM need", "films"):
         import av  # noqa: PLC0415 - large, and not for GIF
         from av.video.stream import VideoStream  # noqa: PLC0415 - the same
@@ -128,7 +119,7 @@ def writing(path: Path) -> Iterator[None]:
         raise NoPictures(f"{path}: {error}") from None
 
 
-def gif(pictures: Pictures, interval_s: float, colours: int) -> bytes:
+def gif(pictures: Sequence[Picture], interval_s: float, colours: int) -> bytes:
     """Return pictures as a GIF that repeats.
 
     All pictures share one palette without dithering, so that what does not move is

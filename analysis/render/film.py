@@ -1,8 +1,9 @@
 """Pictures of robots in motion, drawn one by one."""
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -90,7 +91,7 @@ _PAGES = ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0))
 """Colours on which transparent pictures are drawn."""
 
 
-class RobotFilm(AbstractContextManager["RobotFilm"]):
+class RobotFilm(AbstractContextManager["RobotFilm"], Sequence[Picture]):
     """Pictures of robots, drawn when asked for by number."""
 
     def __init__(
@@ -137,12 +138,10 @@ class RobotFilm(AbstractContextManager["RobotFilm"]):
     def __len__(self) -> int:
         return len(self._poses)
 
-    def __iter__(self) -> Iterator[Picture]:
-        return map(self.__getitem__, range(len(self)))
-
-    def __getitem__(self, index: int) -> Picture:
-        self._advance()
+    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401 - no slices
+        # An index beyond the last raises what ends a loop.
         first, *others = [self._drawn(one, index) for one in self._renderers]
+        self._advance()
         return _see_through(first, others[0]) if others else first
 
     def _drawn(self, renderer: RobotRenderer, index: int) -> Picture:

@@ -65,6 +65,6 @@ def time_arena(
 
 def quadratic_fit(sizes: Sequence[int], factors: Sequence[float]) -> Floats:
     """Return a, b, c of factor = a + b / p + c / p^2 (thesis, figure 6.1), fitted."""
-    p = np.asarray(sizes, dtype=np.float64)
-    terms = np.stack([np.ones_like(p), 1.0 / p, 1.0 / p**2], axis=1)
-    return np.asarray(np.linalg.lstsq(terms, np.asarray(factors), rcond=None)[0])
+    return np.asarray(
+        np.polynomial.polynomial.polyfit(1.0 / np.array(sizes), factors, 2)
+    )

@@ -8,9 +8,13 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from analysis.measures.diversity.fronts import added_volume, front, hypervolume
 from analysis.measures.diversity.grids import Archive, cells, grid_measures, novelty
-from analysis.measures.diversity.objectives import fronts
+from analysis.measures.diversity.objectives import (
+    added_volume,
+    front,
+    fronts,
+    hypervolume,
+)
 from analysis.measures.populations import populations
 from analysis.measures.run_tables import RunTables
 from schema.experiment.document import (
