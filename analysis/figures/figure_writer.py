@@ -39,22 +39,14 @@ MOST_BYTES = 700_000
 
 
 @dataclass(frozen=True, slots=True)
-class Film:
-    """A moving picture of an experiment's best robot."""
-
-    best: Best
-    path: Path
-
-
-@dataclass(frozen=True, slots=True)
 class Drawings:
     """Files that an analysis drew, figures of the thesis first, and what it did not.
 
-    ``no_films`` are reasons by experiment.
+    Films are those of experiments' best robots; ``no_films`` are reasons by experiment.
     """
 
     figures: list[DrawnFigure]
-    films: list[Film]
+    films: list[tuple[Best, Path]]
     no_films: dict[str, str]
     left_out: list[LeftOut]
 
@@ -117,13 +109,13 @@ class FigureWriter:
         stem.with_name(f"{stem.name}.txt").write_text(words, "utf-8")
         self.drawn.append(DrawnFigure(figure, text, files, picture))
 
-    def add_film(self, robot: RobotPicture) -> Film:
+    def add_film(self, robot: RobotPicture) -> tuple[Best, Path]:
         """Write the moving picture of a robot, and beside it its page."""
         stem = self._stem(f"{_FILM}{robot.best.experiment}")
         path = stem.with_name(f"{stem.name}.gif")
         path.write_bytes(film(robot.film, FILM_EVERY_S))
         path.with_suffix(PAGE_ENDING).write_text(robot.page, "utf-8")
-        return Film(robot.best, path)
+        return robot.best, path
 
     def _stem(self, text: str) -> Path:
         """Return a path without ending, distinct also where case does not count."""

@@ -7,12 +7,14 @@ from dataclasses import replace
 from datetime import datetime
 from html import escape
 from importlib.resources import files
+from pathlib import Path
 
 import pyarrow.compute as pc
 from PIL import Image
 
 from analysis.figures.catalogue import DrawnFigure, Section
-from analysis.figures.figure_writer import Drawings, Film
+from analysis.figures.family_tree import Best
+from analysis.figures.figure_writer import Drawings
 from analysis.figures.forms import Tables
 from analysis.figures.look import FAINT, INK, LOOK, RULE, dressed_in, in_look
 from analysis.figures.robot_figures import GAITS, PART_COLOURS
@@ -216,13 +218,14 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     shares = sustained_shares(tables["robots"])
     shown = "".join(
         _film(
-            one,
+            best,
+            path,
             str(names[folder]),
-            shares.get((folder, one.best.island)),
+            shares.get((folder, best.island)),
             has_arena=folder in folders,
         )
-        for one in drawings.films
-        if (folder := str(one.best.folder))
+        for best, path in drawings.films
+        if (folder := str(best.folder))
     )
     reasons = "".join(
         f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
@@ -236,9 +239,10 @@ def _films(tables: Tables, drawings: Drawings) -> str:
     return (f'<div class="films">{shown}</div>{note}' if shown else "") + reasons
 
 
-def _film(one: Film, run: str, share: float | None, *, has_arena: bool) -> str:
-    best = one.best
-    data = base64.b64encode(one.path.read_bytes()).decode()
+def _film(
+    best: Best, path: Path, run: str, share: float | None, *, has_arena: bool
+) -> str:
+    data = base64.b64encode(path.read_bytes()).decode()
     name = f"Robot {best.birth_island}:{best.birth} of {best.folder.name} ({run})"
     if best.island != best.birth_island:
         name += f" on island {best.island}"
@@ -249,8 +253,8 @@ def _film(one: Film, run: str, share: float | None, *, has_arena: bool) -> str:
         f"<figcaption><b>{escape(label(best.experiment))}: fitness "
         f"{number(best.fitness)}{lasting}.</b> {escape(name)}, simulated alone, "
         f"from the middle of its evaluation on.{others} "
-        f"File: <code>figures/{escape(one.path.name)}</code>; "
-        f'<a href="figures/{escape(one.path.stem)}.html">look from all sides</a>.'
+        f"File: <code>figures/{escape(path.name)}</code>; "
+        f'<a href="figures/{escape(path.stem)}.html">look from all sides</a>.'
         "</figcaption></figure>"
     )
 

@@ -9,6 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.load import LoadedRun, has_rules, read_run
+from analysis.viewer.body import numbers_of
 from schema.errors import RevolveError, RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text
@@ -31,7 +32,6 @@ from schema.wire.updates import (
 CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
-_POSE = ("sim_time_s", "angles", "x", "y", "z", "qw", "qx", "qy", "qz")
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
@@ -137,9 +137,9 @@ def frames_of(poses: pa.Table) -> dict[float, dict[BirthId, Floats]]:
     """Return x, y, z, w, x, y, z and angles of each robot, by time, ascending."""
     frames: dict[float, dict[BirthId, Floats]] = {}
     for birth, rows in rows_by_robot(poses):
-        columns = (rows[name].to_pylist() for name in _POSE)
-        for time_s, angles, *core in zip(*columns, strict=True):
-            frames.setdefault(time_s, {})[birth] = np.array([*core, *angles])
+        times = rows["sim_time_s"].to_pylist()
+        for time_s, pose in zip(times, np.hstack(numbers_of(rows)), strict=True):
+            frames.setdefault(time_s, {})[birth] = pose
     return dict(sorted(frames.items()))
 
 

@@ -15,21 +15,17 @@ from analysis.measures.load import LoadedRun
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from schema.agent.machine import platform_tag
-from schema.experiment.document import Experiment, island_experiment, steps_of
+from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.settings import (
-    EvaluationSettings,
-    evaluation_settings_of,
-    lasting,
-)
+from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.files import born_as, read_table
-from schema.tables.learnt import best_trials
 from schema.wire.arena import Rebuild
 from schema.wire.born import robot_of_birth
+from schema.wire.recorded import last_recorded, repeatable
 
 _TRACK = ("sim_time_s", "x", "y", "z", "qw", "qx", "qy", "qz", "angles")
 _COMPARED = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
@@ -73,32 +69,29 @@ def resimulate(
             moved |= _in_arena(run.folder, island, births, simulators, report)
     for number, birth in enumerate(births, start=1):
         if birth not in moved:
-            own = island_experiment(experiment, birth.island)
-            moved[birth] = _alone(run, own, birth, simulators)
+            moved[birth] = _alone(run, experiment, birth, simulators)
             report(number / len(births))
     return [moved[birth] for birth in births]
 
 
 def _alone(
-    run: LoadedRun, own: Experiment, birth: BirthId, simulators: Simulators
+    run: LoadedRun, experiment: Experiment, birth: BirthId, simulators: Simulators
 ) -> Motion:
-    rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
+    """Return the motion of a robot alone on its island, in its fittest evaluation."""
+    table = _rows_of(run.folder, "evaluations", birth)
+    rows = table.to_pylist()
     if not rows:
         raise ViewerError(f"robot {birth.name}: no evaluation is recorded")
     fitness = [-math.inf if row["fitness"] is None else row["fitness"] for row in rows]
     number = fitness.index(max(fitness))
     recorded = rows[number]
-    settings = evaluation_settings_of(own, recorded["point"] or 0)
-    if recorded["simulated_s"] is not None:
-        clock = settings.simulation
-        settings = lasting(settings, steps_of(recorded["simulated_s"], clock))
-    born = _rows_of(run.folder, "births", birth)
-    genome, stored = (born[name][0].as_py() for name in ("genome", "robot"))
-    robot = robot_of_birth(genome, stored, own)
+    learning = _rows_of(run.folder, "learning", birth)
+    (fittest,) = last_recorded(table.slice(number, 1), learning).values()
+    (born,) = _rows_of(run.folder, "births", birth).to_pylist()
     origin = Origin(seed=run.seed, run=run.number, island=birth.island)
-    learnt = best_trials(_rows_of(run.folder, "learning", birth))
-    identity = Identity(origin, birth, recorded["trial"] or learnt.get(birth, 0))
-    evaluation, poses = simulators.alone(robot, settings, identity)
+    own = repeatable(experiment, origin, born, fittest)
+    robot = robot_of_birth(born["genome"], born["robot"], own.document)
+    evaluation, poses = simulators.alone(robot, own.settings, own.identity)
     differing = [
         f"{name} {recorded[name]}, now {getattr(evaluation, name)}"
         for name in _COMPARED
@@ -107,7 +100,7 @@ def _alone(
     name = birth.name
     if len(rows) > 1:
         name += f", evaluation {number + 1} of {len(rows)}, the fittest"
-    if own.robust is None:
+    if own.settings.robust is None:
         return Motion(birth, poses, _verdict(name, differing, recorded["platform"]))
     # The evaluation combines several simulations; the poses are of another one.
     verdict = _verdict(name, differing, recorded["platform"], "evaluates")

@@ -12,7 +12,7 @@ from analysis.comparison.progression import progression
 from analysis.figures.archive_maps import ArchiveMap, MapCell, map_figures
 from analysis.figures.catalogue import DrawnFigure, Figure
 from analysis.figures.family_tree import Best
-from analysis.figures.figure_writer import Drawings, Film, film
+from analysis.figures.figure_writer import Drawings, film
 from analysis.measures.outputs import schema
 from analysis.render.plan import CORE, Outline
 from analysis.report.page import report
@@ -95,7 +95,7 @@ def drawings(folder: Path) -> Drawings:
         )
         for number, source in (("6.9", "outcomes"), ("A", "<a> file"))
     ]
-    films = [Film(Best("soft", Path("soft-1"), 0, 0, 2, 0.3), folder / "one.gif")]
+    films = [(Best("soft", Path("soft-1"), 0, 0, 2, 0.3), folder / "one.gif")]
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5)])
     cells = [
         MapCell(at, at % 2, float(at), f"0:{at}", [Outline(corners, CORE)])

@@ -97,15 +97,17 @@ def shown_again(
         fitness: of the recorded evaluations.
         trials: fitness of the trials of a robot that learns.
     """
+    named = {"island": BIRTH.island, "birth": BIRTH.number}
     rows: dict[str, list[dict[str, Any]]] = {
         "evaluations": [
-            {"trial": number, "point": None, "fitness": value, "path_velocity": 0.1,
-             "straight_velocity": 0.1, "simulated_s": 12.0, "platform": "p"}
+            {**named, "trial": number, "point": None, "fitness": value,
+             "path_velocity": 0.1, "straight_velocity": 0.1, "simulated_s": 12.0,
+             "platform": "p"}
             for number, value in enumerate(fitness)
         ],
-        "births": [{"genome": None, "robot": encode_robot(ROBOT)}],
+        "births": [{**named, "genome": None, "robot": encode_robot(ROBOT)}],
         "learning": [
-            {"island": 0, "birth": 16, "trial": number, "fitness": value}
+            {**named, "trial": number, "fitness": value}
             for number, value in enumerate(trials)
         ],
     }  # fmt: skip
