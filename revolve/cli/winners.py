@@ -71,9 +71,7 @@ def _of_run(folder: Path, most: int | None) -> list[Chosen]:
     if not table.num_rows:
         raise RunFolderError(f"{folder}: no robot was evaluated")
     rows = table.to_pylist()
-    # The fittest first, failed robots last.
-    keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
-    order = sorted(range(len(rows)), key=keys.__getitem__)
+    order = _fittest_first(rows)
     last = set([number for number in order if rows[number]["is_last"]][:most])
     ever = individual(next(best_ever(folder), rows[order[0]]))
     own = OwnRun(folder)
@@ -121,3 +119,9 @@ def _seasons(
         )
         seasons[point] = replace(there, simulation=simulation)
     return seasons
+
+
+def _fittest_first(rows: list[dict[str, Any]]) -> list[int]:
+    """Return the numbers of robots by descending fitness, failed robots last."""
+    keys = [(row["is_failed"], *fittest_first(row)) for row in rows]
+    return sorted(range(len(rows)), key=keys.__getitem__)

@@ -14,6 +14,7 @@ import numpy as np
 from schema.experiment.settings import ArenaSettings
 from schema.robot.trace import Floats
 from schema.wire.arena import Changes, Insertion
+from tests.worker.arena_cases import Regroupings
 from worker.arena.threads import ThreadTeam
 from worker.arena.world import World
 from worker.bench.arena_timing import Place
@@ -231,10 +232,10 @@ def time_arena(
     if recorded is not None:
         recorded.world.advance(warm_up_s * second)
     population, wall, cluster, solo = world.population, 0.0, 0.0, 0.0
+    regrouped = Regroupings(population)
     merging.wrap(population, "merge")
     changing.wrap(population, "regroup", "split", "remove", "catch_up")
     changing.wrap(world, "apply")
-    merges, splits = population.merges, population.splits
     unborn, pool = list(spares), ThreadTeam(threads)
     for number in range(seconds // advance_s):
         changes = Changes()
@@ -262,8 +263,8 @@ def time_arena(
         solo_s=solo,
         changing_s=changing.total_s,
         merging_s=merging.total_s,
-        merges=population.merges - merges,
-        splits=population.splits - splits,
+        merges=regrouped.merges,
+        splits=regrouped.splits,
         largest=max((len(c.members) for c in population.clusters), default=0),
     )
 

@@ -29,6 +29,7 @@ from tests.benchmarks.arena_timing import (
     even_places,
     time_arena,
 )
+from tests.worker.arena_cases import Regroupings
 from worker.bench.arena_bench import RobotSource
 from worker.bench.arena_timing import insertions, quadratic_fit
 
@@ -172,13 +173,14 @@ def test_recorded_steps_alone_end_where_the_arena_ends() -> None:
     """With a merge, whose dropped steps are not repeated."""
     inserted = insertions(random_robots(3), [(0.0, 0.0), (0.3, 0.0), (5.0, 0.0)])
     recorded = RecordedArena(SETTINGS, inserted)
+    regrouped = Regroupings(recorded.world.population)
     for until in (500, 1000):
         recorded.advance(Changes(), until)
         copies = recorded.copies
         assert recorded.replay(lambda: 0.0) == 0.0
         for cluster in recorded.world.population.clusters:
             assert copies[cluster].qpos.tolist() == cluster.data.qpos.tolist()
-    assert recorded.world.population.merges > 0
+    assert regrouped.merges > 0
 
 
 def test_fit_recovers_the_coefficients_of_the_thesis() -> None:

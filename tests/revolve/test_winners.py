@@ -28,7 +28,7 @@ def test_of_equally_fit_robots_that_of_the_first_birth_precedes() -> None:
             "is_failed": [False, False, False, False, True],
         }
     )
-    assert _fittest_first(found) == [3, 2, 1, 0, 4]
+    assert _fittest_first(found.to_pylist()) == [3, 2, 1, 0, 4]
 
 
 def test_last_evaluation_on_an_island_is_repeated() -> None:

@@ -1,7 +1,7 @@
 """Arenas for tests: settings, newborns, worlds and advances."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import repeat
 from typing import Any
 
@@ -10,10 +10,12 @@ from msgspec.structs import replace
 
 from schema.experiment.document import ArenaSection, Experiment
 from schema.experiment.settings import ArenaSettings
+from schema.robot.groups import Group
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Changes, Insertion
 from worker.arena.world import World
+from worker.clusters.population import ArenaPopulation
 
 EXPERIMENT = Experiment(name="test")
 SECOND = 200
@@ -61,13 +63,42 @@ def placed(robot: Robot, *places: tuple[float, float]) -> tuple[Insertion, ...]:
     return tuple(map(Insertion, births, repeat(robot), places))
 
 
+class Regroupings:
+    """Numbers of merges and splits of a population's clusters from now on."""
+
+    def __init__(self, population: ArenaPopulation) -> None:
+        self.merges = self.splits = 0
+        self._population, self._regroup = population, population.regroup
+        population.regroup = self._count  # type: ignore[method-assign]
+
+    def _count(self, groups: Iterable[Group]) -> None:
+        population, groups = self._population, list(groups)
+        present = {cluster.members for cluster in population.clusters}
+        divided: list[Group] = []
+        for members in groups:
+            if members not in present:
+                homes = {population.cluster_of[birth].members for birth in members}
+                self.merges += len(homes) - 1
+                divided += homes if len(homes) == 1 else ()
+        self.splits += len(divided) - len(set(divided))
+        self._regroup(groups)
+
+
 def populated(
     settings: ArenaSettings, newborns: Sequence[Insertion], threads: int = 1
 ) -> World:
     """Return a world into which robots have just been inserted."""
+    return counted(settings, newborns, threads)[0]
+
+
+def counted(
+    settings: ArenaSettings, newborns: Sequence[Insertion], threads: int = 1
+) -> tuple[World, Regroupings]:
+    """Return a world as ``populated`` does, and its merges and splits so far."""
     world = World(settings, threads)
+    regrouped = Regroupings(world.population)
     world.apply(Changes(insertions=tuple(newborns)))
-    return world
+    return world, regrouped
 
 
 def state_of(world: World, birth: BirthId) -> bytes:

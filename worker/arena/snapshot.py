@@ -89,7 +89,6 @@ def take_in(
     if sorted(chain.from_iterable(state.clusters)) != births:
         raise MalformedMessage("snapshot: every robot must be in one cluster")
     clusters = [each.members for each in population.clusters]
-    merges = population.merges
     population.add(
         [
             _restored(birth, decode(_RobotState, robot, ADVANCE_BYTES), population)
@@ -97,7 +96,6 @@ def take_in(
         ]
     )
     population.regroup([*clusters, *state.clusters])
-    population.merges = merges
 
 
 @lru_cache(maxsize=8)

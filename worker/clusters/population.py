@@ -39,7 +39,6 @@ class ArenaPopulation:
         by_cost: the same clusters, most expensive first.
         rollout: the interval that is being handled; None between two intervals.
         proximity: the test for merges and splits.
-        merges, splits: numbers of merges and splits of clusters.
         patch_lights: positions of the lights of patches [m].
     """
 
@@ -52,7 +51,6 @@ class ArenaPopulation:
         self._columns = StateColumns(Schedule(settings).most_moments)
         self.layout = Layout((), self.robot_rows, self._columns)
         self.rollout: Rollout | None = None
-        self.merges = self.splits = 0
         self.patch_lights: tuple[Vector, ...] = ()
         self.proximity = Proximity(settings)
         self._new: list[Cluster] = []
@@ -159,16 +157,9 @@ class ArenaPopulation:
         """Form exactly these clusters, each ascending by birth."""
         present = {cluster.members: cluster for cluster in self.clusters}
         settled: list[Cluster] = []
-        divided: list[Group] = []
         for members in groups:
-            if members in present:
-                settled.append(present.pop(members))
-                continue
-            before = sorted({self.cluster_of[birth].members for birth in members})
-            self.merges += len(before) - 1
-            divided += before if len(before) == 1 else ()
-            settled.append(self._move(members))
-        self.splits += len(divided) - len(set(divided))
+            is_there = members in present
+            settled.append(present.pop(members) if is_there else self._move(members))
         if present:
             self._settle(settled)
 

@@ -159,7 +159,6 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         (pictures[0], pictures[1]),
         (0.0, 0.5),
         (pictures[0], pictures[1]),
-        0.5,
         0.031,
         relatives,
         pictures,

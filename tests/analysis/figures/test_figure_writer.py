@@ -32,7 +32,7 @@ def tree_of(experiment: str) -> Figure:
 def robot_of(experiment: str, shade: int) -> RobotPicture:
     pictures = tuple(np.full((8, 8, 3), shade, np.uint8) for _ in range(2))
     best = Best(experiment, Path("f"), 0, 0, 1, 0.1)
-    return RobotPicture(best, (), (), pictures, 0.1, 0.0, None, {}, {}, "page")
+    return RobotPicture(best, (), (), pictures, 0.0, None, {}, {}, "page")
 
 
 def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
@@ -49,13 +49,13 @@ def test_each_experiment_has_files_of_its_own(tmp_path: Path) -> None:
     ]
     assert {path for path in pictures if path.is_file()} == {*tmp_path.glob("*.png")}
     assert len({*pictures}) == len({*tmp_path.glob("*.pdf")}) == len(names)
-    assert [one.path.name for one in films[:3]] == [
+    assert [path.name for _, path in films[:3]] == [
         "best-robot-of-a-b.gif",
         "best-robot-of-A-b-2.gif",
         "best-robot-of-sw-map=maps-a.png.gif",
     ]
-    for at, one in enumerate(films):
-        with Image.open(one.path) as shown:
+    for at, (_, path) in enumerate(films):
+        with Image.open(path) as shown:
             assert abs(int(np.asarray(shown.convert("L"))[4, 4]) - 60 * at) < 8
 
 

@@ -138,10 +138,9 @@ def test_robots_on_one_obstacle_are_not_in_contact() -> None:
     settings = arena(Environment(scenery=slab), record_touches=True, drop_m=0.0)
     world = populated(settings, placed(BOX, (-0.3, 0.0), (0.3, 0.0)))
     assert seconds(world, 1.0).touches == ()
-    assert world.population.merges == 0
+    assert len(world.population.clusters) == 2
     world = populated(settings, placed(BOX, (0.0, 0.0), (0.095, 0.0)))
     assert seconds(world, 1.0).touches == ()
-    assert world.population.merges == 1
     (cluster,) = world.population.clusters
     assert cluster.data.ncon >= 8
     for birth in (A, B):

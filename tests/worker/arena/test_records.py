@@ -15,7 +15,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.robot.trace import COMPUTED, RECORDED, Trace
 from schema.wire.arena import Advance, BrainChange, Changes
-from tests.worker.arena_cases import placed, populated
+from tests.worker.arena_cases import counted, placed, populated
 from tests.worker.evaluations import with_simulation
 from worker.arena.world import World
 from worker.measures import BUILT_IN
@@ -77,12 +77,12 @@ def test_energy_of_robots_that_merge_is_not_lost(
 ) -> None:
     """A pile of robots merges and splits; energy never falls."""
     own, traces = recorded
-    world = populated(
+    world, regrouped = counted(
         replace(own, arena=replace(ARENA, drop_m=0.25)),
         placed(turtle, (0.0, 0.0), (0.1, 0.0), (0.2, 0.05)),
     )
     world.advance(200)
-    assert world.population.merges > 0
+    assert regrouped.merges > 0
     world.advance(400)
     assert len(traces) == 6  # of both advances
     for trace in traces:
@@ -94,7 +94,7 @@ def test_energy_of_robots_that_merge_is_not_lost(
 def test_restored_arena_answers_equally(turtle: Robot, stops: tuple[int, ...]) -> None:
     own = settings()
     places = ((0.0, 0.0), (0.12, 0.0), (1.0, 1.0))
-    whole = populated(own, placed(turtle, *places))
+    whole, regrouped = counted(own, placed(turtle, *places))
     steady: list[Advance] = [whole.advance(stop) for stop in stops]
     world = populated(own, placed(turtle, *places))
     for expected, (stop, _) in zip(steady, pairwise((*stops, 0)), strict=True):
@@ -103,7 +103,7 @@ def test_restored_arena_answers_equally(turtle: Robot, stops: tuple[int, ...]) -
         world = World.restore(own, world.snapshot())
         assert world.digest() == expected.digest
     assert all(len(one.measures) == len(NAMES) for one in steady[-1].judgements)
-    assert whole.population.merges > 0
+    assert regrouped.merges > 0
 
 
 def test_restored_arena_records_equally(

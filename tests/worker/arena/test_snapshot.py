@@ -21,6 +21,7 @@ from schema.wire.codec import decode
 from tests.worker.arena_cases import (
     SECOND,
     SETTINGS,
+    counted,
     crowd,
     populated,
     seconds,
@@ -35,14 +36,14 @@ RECORDING = settings_of(record_touches=True)
 @pytest.mark.slow
 def test_thirty_robots_continue_after_a_snapshot(robot_of: Robots) -> None:
     """The snapshot is taken right after merges, with contacts."""
-    world = populated(RECORDING, crowd(robot_of, 30, 0.8))
+    world, regrouped = counted(RECORDING, crowd(robot_of, 30, 0.8))
     taken: list[tuple[int, bytes]] = []
     merges = 0
     while len(taken) < 3:
         world.advance(world.step + 8)
         touching = sum(len(c.touching()) for c in world.population.clusters)
-        if world.population.merges > merges and touching:
-            merges = world.population.merges
+        if regrouped.merges > merges and touching:
+            merges = regrouped.merges
             taken.append((world.step, world.snapshot()))
     end = world.step + SECOND + 3
     world.advance(end)

@@ -15,7 +15,15 @@ from schema.robot.robot import Part, Robot
 from schema.robot.trace import Floats
 from schema.wire.arena import Casualty, Changes, Insertion, Touch
 from tests.schema import robots
-from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
+from tests.worker.arena_cases import (
+    SETTINGS,
+    Regroupings,
+    counted,
+    crowd,
+    populated,
+    seconds,
+    settings_of,
+)
 from tests.worker.arena_oracle import Oracle
 from worker.arena.world import World
 
@@ -24,12 +32,13 @@ Robots = Callable[[int], Robot]
 
 def live(
     robot_of: Robots, *, radius_m: float, drop_m: float, lives: int, seed: int
-) -> tuple[World, Oracle]:
-    """Return an arena after ``lives`` seconds of births and deaths.
+) -> tuple[World, Oracle, int]:
+    """Return an arena after ``lives`` seconds of births and deaths, and its merges.
 
     Four robots are born per second; the oldest beyond 30 are removed.
     """
     world = World(settings_of(drop_m=drop_m), threads=2)
+    regrouped = Regroupings(world.population)
     oracle = Oracle(world)
     rng = np.random.default_rng(seed)
     for second in range(lives):
@@ -40,7 +49,7 @@ def live(
         if rng.random() < 0.2:
             world.apply(Changes(removals=world.births[::5]))
     world.close()
-    return world, oracle
+    return world, oracle, regrouped.merges
 
 
 @pytest.mark.slow
@@ -49,12 +58,12 @@ def test_no_contact_is_missed_in_long_runs(robot_of: Robots) -> None:
     """Over 5,000 pair-steps in contact and 100 merges."""
     pair_steps = merges = 0
     for radius_m, drop_m in ((1.4, 0.25), (0.9, 0.25), (0.5, 0.5), (0.35, 1.0)):
-        world, oracle = live(
+        _, oracle, merged = live(
             robot_of, radius_m=radius_m, drop_m=drop_m, lives=8, seed=7
         )
         assert oracle.missed == []
         pair_steps += oracle.pair_steps
-        merges += world.population.merges
+        merges += merged
     assert pair_steps >= 5_000
     assert merges >= 100
 
@@ -86,7 +95,7 @@ def test_separated_robots_are_split(turtle: Robot) -> None:
     near = [
         Insertion(BirthId(0, number), turtle, (0.3 * number, 0.0)) for number in (0, 1)
     ]
-    world = populated(SETTINGS, near)
+    world, regrouped = counted(SETTINGS, near)
     seconds(world, 1.0)
     first, second = (world.population.find(i.birth) for i in near)
     sizes = []
@@ -98,7 +107,7 @@ def test_separated_robots_are_split(turtle: Robot) -> None:
     assert sizes[1] == 1
     assert sizes[-1] == 2
     assert first.view is first.body.solo.views[0]
-    assert (world.population.merges, world.population.splits) == (1, 1)
+    assert (regrouped.merges, regrouped.splits) == (1, 1)
 
 
 @pytest.mark.parametrize(("core", "imu"), [("", 6), ("crawlers:BLIND_CORE", 0)])

@@ -14,7 +14,14 @@ from schema.parts import Vector
 from schema.robot.groups import Group, connected_components, overlaps
 from schema.robot.ids import BirthId
 from schema.wire.arena import Changes
-from tests.worker.arena_cases import SETTINGS, crowd, populated, settings_of, state_of
+from tests.worker.arena_cases import (
+    SETTINGS,
+    counted,
+    crowd,
+    populated,
+    settings_of,
+    state_of,
+)
 from tests.worker.clusters.invariants import check_population
 from tests.worker.conftest import random_robot
 from worker.arena.world import World
@@ -127,11 +134,11 @@ def test_any_sequence_of_operations_keeps_the_invariants(data: DataObject) -> No
 def test_arenas_keep_the_invariants_while_robots_meet() -> None:
     for radius_m, drop_m in ((0.4, 0.3), (0.8, 0.0)):
         newborns = crowd(random_robot, 12, radius_m)
-        world = populated(settings_of(drop_m=drop_m), newborns)
+        world, regrouped = counted(settings_of(drop_m=drop_m), newborns)
         for _ in range(20):
             world.advance(world.step + 33)
             check_population(world.population)
-        assert world.population.merges
+        assert regrouped.merges
         world.close()
 
 

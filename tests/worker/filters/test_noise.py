@@ -17,6 +17,7 @@ from schema.robot.trace import Floats
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import (
     SETTINGS,
+    counted,
     crowd,
     populated,
     seconds,
@@ -251,9 +252,9 @@ def test_noise_is_independent_of_threads_advances_and_restores(
     robot_of: Robots,
 ) -> None:
     newborns = crowd(robot_of, 8, 0.4)
-    plain = populated(NOISY, newborns)
+    plain, regrouped = counted(NOISY, newborns)
     expected = lived(plain, robot_of)
-    assert plain.population.merges > 0
+    assert regrouped.merges > 0
     threaded = populated(NOISY, newborns, threads=2)
     assert lived(threaded, robot_of) == expected
     threaded.close()
