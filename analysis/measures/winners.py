@@ -5,7 +5,6 @@ The best robot is the fittest of the last populations, simulated alone.
 
 from collections.abc import Callable, Mapping
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 from msgspec.structs import replace
@@ -50,10 +49,10 @@ def with_later_windows(
     name = individual(best)
     first, *later = _windows(run, tables, name, best["island"], evaluate)
     values = later_fitness(later), sustained(first, later)
-    homes, births = (np.asarray(robots[key]) for key in ("birth_island", "birth"))
-    is_best = (homes == name.island) & (births == name.number)
+    homes, births = (robots[key] for key in ("birth_island", "birth"))
+    is_best = pc.and_(pc.equal(homes, name.island), pc.equal(births, name.number))
     for key, value in zip(LATER, values, strict=True):
-        column = pa.array([value if own else None for own in is_best], pa.float64())
+        column = pc.if_else(is_best, pa.scalar(value, pa.float64()), None)
         robots = robots.set_column(robots.schema.get_field_index(key), key, column)
     return robots
 

@@ -83,7 +83,8 @@ class ControlLoop:
         self.data = data = mujoco.MjData(self.model)
         self._core, self._velocities = data.qpos[:3].data, data.qvel.data
         self._view = EngineView(robot, self.model, data, settings)
-        self._has_work = "energy" in probed_channels(settings)
+        probe = self._view.probe if "energy" in probed_channels(settings) else None
+        self._working = [] if probe is None else [probe]
         self._start_control()
         state = self.model, data
         self._filters = filters_of(robot, settings, identity, state, means)
@@ -184,16 +185,13 @@ class ControlLoop:
 
     def _step_to(self, until: int) -> None:
         """Step the physics with constant commands; sample on the way."""
-        model, data, probe = self.model, self.data, self._view.probe
+        model, data, working = self.model, self.data, self._working
         while self.now < until:
             if self.now == self._next_sample:
                 # After the tick, as in an arena: a sample has the readings of its step.
                 self._sample()
             stop = min(until, self._next_sample)
-            if probe is not None and self._has_work:
-                step_with([probe], model, data, stop - self.now)
-            else:
-                mujoco.mj_step(model, data, stop - self.now)
+            step_with(working, model, data, stop - self.now)
             self.now = stop
 
     def _sample(self) -> None:
