@@ -32,7 +32,7 @@ OPENED = ("epoch", "lock")
 """Files that each opening of a run changes."""
 HOLDS = (
     "a: already holds this run with 18 births; to resume it: "
-    "revolve resume a --births 20; or choose another folder"
+    "revolve resume a --in-process --births 20; or choose another folder"
 )
 
 
