@@ -3,6 +3,7 @@
 import argparse
 import json
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 from uuid import uuid4
@@ -32,8 +33,9 @@ from schema.agent.address import read_address
 from schema.agent.command import NETWORK, add_shared, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import tell_user
-from schema.errors import NetworkError, counted
+from schema.errors import NetworkError, RunFolderError, counted
 from schema.tables.arrow import skip_pandas
+from schema.tables.description import groups_of
 from schema.wire.codec import encode
 from schema.wire.operator import (
     GetStatus,
@@ -192,6 +194,9 @@ def _without_coordinator(status: Status, root: Path) -> str:
             f"only, and are kept; to continue: {resume_command(root)}"
         )
     if not running:
+        with suppress(RunFolderError):  # other groups are on other machines
+            if groups_of(root):
+                return f"no coordinator is running; to continue: {resume_command(root)}"
         return "no coordinator is running"
     # Each coordinator has a folder of its own: that of its campaign or its run.
     first, above = running[0], running[0].parent
