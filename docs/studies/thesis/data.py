@@ -11,7 +11,6 @@ from statistics import fmean
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from analysis.comparison.comparison import Outcomes, RunOutcomes, known
@@ -259,14 +258,15 @@ def _with_courses(outcomes: pa.Table, data: Path) -> pa.Table:
 
     They are computed from the kept populations, of earlier and of later repeats alike.
     """
-    populations = kept(data, "populations")
+    columns = ["births", "fitness", "diversity"]
+    populations = kept(data, "populations").select(["folder", *columns]).to_pandas()
+    of_folder = dict(iter(populations.groupby("folder")))
     found: list[dict[str, float]] = []
-    columns = ("births", "fitness", "diversity")
     for folder, births in zip(
         outcomes["folder"].to_pylist(), outcomes["births"].to_pylist(), strict=True
     ):
-        mine = populations.filter(pc.field("folder") == folder)
-        values = {name: np.asarray(mine[name], np.float64) for name in columns}
+        mine = of_folder[folder]
+        values = {name: mine[name].to_numpy(np.float64) for name in columns}
         found.append(of_courses(values, values["births"], births, SPACING))
     for name in COURSES:
         column = pa.array([one[name] for one in found], pa.float64(), from_pandas=True)
