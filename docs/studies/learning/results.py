@@ -8,13 +8,14 @@ The rows are those of ``docs.studies.learning.runs``. The unit is the run.
 
 import sys
 
+import matplotlib.pyplot as plt
 import numpy as np
 
 from analysis.comparison.statistics import mean_difference, rank_sum_p
 from docs.studies.diversity.results import FEWEST, with_interval
 from docs.studies.diversity.runs import LATER, planned
 from docs.studies.learning.runs import DATA, EVALUATIONS, EXPERIMENTS, REFERENCE
-from docs.studies.pages import Parts, command, csv_rows, markdown
+from docs.studies.pages import PICTURES, Parts, command, csv_rows, markdown
 
 VALUES = {
     "mean": "last population, mean [mm/s]",
@@ -55,12 +56,37 @@ def lines() -> list[str]:
     return [made, *(["", *markdown(heads, cells)] if cells else [])]
 
 
+def draw() -> None:
+    """Write the picture of the fittest robots in their first and later windows."""
+    rows = csv_rows(DATA / "runs.csv")
+    figure, panel = plt.subplots(figsize=(7.2, 3.2), layout="constrained")
+    shown = (
+        ("first", "first window", "#b8b8b8", -0.17),
+        ("later", f"next {LATER} windows", "#0072b2", 0.17),
+    )
+    for column, label, colour, shift in shown:
+        for place, name in enumerate(EXPERIMENTS):
+            own = 1e3 * numbers(rows, name, column)
+            if len(own):
+                at = np.full(len(own), place + shift)
+                panel.plot(own, at, "o", color=colour, alpha=0.55, ms=5, mew=0)
+                panel.plot(own.mean(), place + shift, "|", color="black", ms=11, mew=2)
+        panel.plot([], [], "o", color=colour, mew=0, label=label)
+    panel.set(xlim=(0, None), xlabel="fitness of the fittest robot [mm/s]; bars: means")
+    panel.set_yticks(range(len(EXPERIMENTS)), EXPERIMENTS)
+    panel.invert_yaxis()
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.legend(frameon=False, fontsize=9)
+    figure.savefig(PICTURES / "learning-remedies.png", dpi=130)
+    plt.close(figure)
+
+
 def pages() -> dict[str, Parts]:
     """Return the generated part of the page."""
     return {"learning.md": {"remedies": lines()}}
 
 
-main = command(__doc__, pages)
+main = command(__doc__, pages, draw)
 
 if __name__ == "__main__":
     sys.exit(main(None))

@@ -24,7 +24,7 @@ from schema.experiment.file import experiment_from_text, experiment_text
 _TO_THE_END = {"outcomes", "populations", "runs"}
 
 
-_OTHER_STUDIES = {"diversity", "ecosystem", "suite", "windows"}
+_OTHER_STUDIES = {"diversity", "ecosystem", "learning", "suite", "windows"}
 """Folders of the rows of other studies."""
 
 
