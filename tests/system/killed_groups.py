@@ -1,10 +1,10 @@
-"""Program that kills and stops coordinators of groups of islands until all have ended.
+"""Program that kills and stops processes of groups of islands until all have ended.
 
 Arguments: a seed, a number of schedules, and a number of groups. A seed draws every
 kill. A killed coordinator is resumed after some time, perhaps when the others have
-ended; one that is stopped goes on after some time. Prints a line for each schedule, and
-exits with 1 if one does not end or a repeatable column differs from the run of one
-coordinator.
+ended; one that is stopped goes on after some time; hub, analyzer and worker are
+started again. Prints a line for each schedule, and exits with 1 if one does not end or
+a repeatable column differs from the run of one coordinator.
 """
 
 import signal
@@ -26,7 +26,9 @@ MEAN_GROWTH = 0.2
 """Mean growth of the journals between two kills, as a share of the whole one."""
 LONGEST_AWAY_S = 5.0
 STOPPED = 0.25
-"""Share of the kills that stop a coordinator instead."""
+"""Share of the kills of coordinators that stop one instead."""
+OTHERS = 0.3
+"""Share of the kills that are of hub, analyzer or worker."""
 
 
 class Schedule:
@@ -37,9 +39,12 @@ class Schedule:
         self.folders = [workspace.folder / f"group-{number}" for number in range(of)]
         address = free_address()
         self.where = ("--connect", address, "--quiet")
-        workspace.start("hub", "--listen", address)
-        for role in ("analyzer", "worker"):
-            workspace.start(role, "--connect", address, "--processes", "1")
+        agent = ("--connect", address, "--processes", "1")
+        self.words = {"hub": ("--listen", address), "analyzer": agent, "worker": agent}
+        self.others = {
+            role: workspace.start(role, *self.words[role]) for role in self.words
+        }
+        self.absent: dict[str, float] = {}
         self.running: dict[int, Process] = {}
         self.due_s = dict.fromkeys(range(of), 0.0)
         self.kills = 0
@@ -58,9 +63,15 @@ class Schedule:
                 if process.poll() is not None:
                     assert process.returncode == 0, process.communicate()
                     del self.running[number]
+            for role in [each for each, at_s in self.absent.items() if at_s <= now_s]:
+                del self.absent[role]
+                self.others[role] = self.workspace.start(role, *self.words[role])
             if self.running and sum(map(size, self.folders)) >= next_size:
-                number = int(self.rng.choice(sorted(self.running)))
-                self.kill(number, now_s + self.rng.uniform(0.0, LONGEST_AWAY_S))
+                until = now_s + self.rng.uniform(0.0, LONGEST_AWAY_S)
+                if self.rng.random() < OTHERS:
+                    self.kill_other(str(self.rng.choice(sorted(self.words))), until)
+                else:
+                    self.kill(int(self.rng.choice(sorted(self.running))), until)
                 grown = self.rng.exponential(MEAN_GROWTH * whole)
                 next_size = sum(map(size, self.folders)) + grown
         return not (self.running or self.due_s)
@@ -78,6 +89,13 @@ class Schedule:
             words = ("coordinator", *births, *group, *self.where)
         log = self.workspace.folder / f"{number}.log"
         self.running[number] = self.workspace.start(*words, log=log)
+
+    def kill_other(self, role: str, until_s: float) -> None:
+        """Kill hub, analyzer or worker; it comes back at some time."""
+        self.kills += 1
+        self.absent[role] = until_s
+        self.others[role].kill()
+        self.others[role].wait()
 
     def kill(self, number: int, until_s: float) -> None:
         """Kill or stop a coordinator for some time."""
