@@ -61,7 +61,8 @@ class Schedule:
                 self.start(number)
             for number, process in list(self.running.items()):
                 if process.poll() is not None:
-                    assert process.returncode == 0, process.communicate()
+                    log = self.workspace.folder / f"{number}.log"
+                    assert process.returncode == 0, log.read_text()[-2000:]
                     del self.running[number]
             for role in [each for each, at_s in self.absent.items() if at_s <= now_s]:
                 del self.absent[role]

@@ -100,7 +100,7 @@ def test_one_command_runs_all_groups(workspace: Workspace) -> None:
     assert {(each / "state").read_text() for each in folders} == {"stopped"}
     told = workspace.run("status", "three")
     assert "0 of 3 runs finished" in told
-    assert "to continue: revolve resume three\n" in told
+    assert "to continue: revolve resume three --workers 2\n" in told
     told = workspace.run("resume", "three", "--workers", "2", "--quiet")
     assert [line.split(":")[0] for line in told.splitlines() if "births" in line] == [
         f"three/group-{number}" for number in range(3)
