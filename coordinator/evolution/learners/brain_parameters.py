@@ -92,11 +92,9 @@ class BrainParameters:
     def _values(self, robot: Robot) -> Iterator[tuple[object, Parameter, float]]:
         names, edges = self._names(robot)
         for name, neuron in zip(names, robot.brain.neurons, strict=True):
-            own = self._kinds.get(neuron.kind, ())
-            if own:
-                for place, each in enumerate(own):
-                    if _is_learnt(each):
-                        yield (name, place), each, neuron.parameters[place]
+            for place, each in enumerate(self._kinds.get(neuron.kind, ())):
+                if _is_learnt(each):
+                    yield (name, place), each, neuron.parameters[place]
         if self._has_weights:
             for name, edge in zip(edges, robot.brain.connections, strict=True):
                 yield name, self._weight, edge.weight
