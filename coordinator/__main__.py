@@ -241,14 +241,19 @@ def _stoppable(folder: Path, deployment: Deployment, execute: Callable[[], int])
     try:
         return execute()
     except HubLost as error:
-        tell_user(f"{error}; to resume: {command_line('resume', folder, *flags)}")
+        again = f"; to resume: {command_line('resume', folder, *flags)}"
+        tell_user(f"{error}{again if _has_begun(folder) else ''}")
         return 1
     except KeyboardInterrupt:
-        begun = (folder / "group-0").exists()
-        if is_campaign(folder) or holds_run(folder) or begun:
+        if _has_begun(folder):
             advise(stopped(folder, flags))
         tell_stopped()
         return STOPPED
+
+
+def _has_begun(folder: Path) -> bool:
+    begun = is_campaign(folder) or holds_run(folder)
+    return begun or (folder / "group-0").exists()
 
 
 def _experiments(

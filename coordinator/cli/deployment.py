@@ -1,6 +1,7 @@
 """Deployment of a run: its network, its own processes, its viewer."""
 
 import contextlib
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -72,9 +73,11 @@ class Deployment:
 
 @contextmanager
 def connected_agents(
-    folder: Path, deployment: Deployment
+    folder: Path, deployment: Deployment, stop: threading.Event
 ) -> Iterator[tuple[Network | LocalAgents, list[ProcessPool]]]:
     """Open the connection to agents and start the processes of a deployment.
+
+    ``stop`` ends the wait for a hub.
 
     Yields:
         The connection, and the process pools, which need regular supervision.
@@ -95,6 +98,7 @@ def connected_agents(
                 tls=tls,
                 certificates=deployment.certificates,
                 give_up_after_s=deployment.agent.give_up_after_s,
+                stop=stop,
             )
         )
         # The folder of a run that finds no hub stays empty.

@@ -46,7 +46,7 @@ def execute_runs(
     stop = stop_on_signals()
     with ExitStack() as stack:
         publish = _open_metrics(deployment.metrics, stack)
-        agents, pools = stack.enter_context(connected_agents(folder, deployment))
+        agents, pools = stack.enter_context(connected_agents(folder, deployment, stop))
         network = agents if isinstance(agents, Network) else None
         scheduler = RunScheduler(
             planned,

@@ -186,14 +186,16 @@ class Network:
         tls: Tls | None = None,
         certificates: Iterable[Certificate] | None = None,
         give_up_after_s: float = math.inf,
+        stop: threading.Event | None = None,
     ) -> None:
         """Configure the session; ``with`` opens it.
 
         The hub within this process listens on the addresses, beside a Unix socket that
         only this user can connect to. Or a hub is elsewhere, at ``connect``, and
-        nothing listens here; without it for ``give_up_after_s``, ``receive`` raises. No
-        other process ever has the name. The certificates are those that may connect;
-        None: all of the authority.
+        nothing listens here; without it for ``give_up_after_s``, ``receive`` raises.
+        ``with`` waits for it as long, if that is finite, or until ``stop``. No other
+        process ever has the name. The certificates are those that may connect; None:
+        all of the authority.
 
         Raises:
             NetworkError: invalid names or addresses, or an address that other machines
@@ -214,6 +216,7 @@ class Network:
         self._hub = HubWatch(
             self.address, tell_user, warn_user, give_up_after_s, tls=tls, fleet=fleet
         )
+        self._stop = stop or threading.Event()
         self._look_s = 0.0
         self._inbox: Inbox[_News] = Inbox()
         self._membership = Membership(wire_version(), self.faults)
@@ -233,16 +236,10 @@ class Network:
 
         Raises:
             NetworkError: an address in use, or no hub.
+            KeyboardInterrupt: stopped while there was no hub.
         """
         with ExitStack() as opened:
-            try:
-                config = session_config(self._config, self._me)
-                self._session = opened.enter_context(open_session(config))
-            except zenoh.ZError as error:
-                if self._is_hub:
-                    raise cannot_listen(self.address, str(error)) from None
-                line = why_no_hub(self.address, self._hub.tls)
-                raise NetworkError(line) from None
+            self._session = opened.enter_context(self._open())
             self._declare()
             if self._is_hub:
                 opened.enter_context(watch_unlisted(self._session, self._config))
@@ -251,6 +248,21 @@ class Network:
 
     def __exit__(self, *_: object) -> None:
         self._opened.close()
+
+    def _open(self) -> zenoh.Session:
+        config = session_config(self._config, self._me)
+        while not self._stop.is_set():
+            try:
+                return open_session(config)
+            except zenoh.ZError as error:
+                if self._is_hub:
+                    raise cannot_listen(self.address, str(error)) from None
+                if self._hub.give_up_after_s == math.inf:
+                    line = why_no_hub(self.address, self._hub.tls)
+                    raise NetworkError(line) from None
+            self._hub.seen(())
+            self._stop.wait(_LOOK_S)
+        raise KeyboardInterrupt
 
     def _declare(self) -> None:
         protocol, _, port = parse_address(self.address)

@@ -180,6 +180,31 @@ def test_an_agent_gives_up_without_a_hub(workspace: Workspace) -> None:
     ]
 
 
+def test_a_run_waits_for_a_hub_that_begins_later(workspace: Workspace) -> None:
+    (workspace.folder / "slow.toml").write_text(SLOW)
+    place = f"unixsock-stream/{workspace.folder}/h"
+    words = ("coordinator", "slow.toml", "--connect", place, "--out", "run")
+    waits = f"no hub at {place}; retrying; press Ctrl-C to stop"
+    gone = f"no hub at {place} for 0.5 s: giving up (--give-up-after)"
+    assert said(workspace.run(*words, "--give-up-after", "0.5", code=1)) == [
+        waits,
+        gone,
+    ]
+    stopped = workspace.start(*words, "--give-up-after", "60")
+    assert said(stopped.stderr.readline()) == [waits]
+    taken_s, told = stop(stopped, signal.SIGINT, family(stopped.pid))
+    assert taken_s < LIMIT_S
+    words = ("resume", "run", "--connect", place, "--give-up-after", "60")
+    assert told.splitlines()[-1].startswith("stopped; to resume: revolve resume run")
+    later = workspace.start(*words, "--quiet")
+    assert said(later.stderr.readline()) == [waits]
+    workspace.start("hub", "--listen", place)
+    assert said(later.stderr.readline()) == [f"connected to {place}"]
+    workspace.start("worker", "--connect", place)
+    workspace.start("analyzer", "--connect", place)
+    wait_until(lambda: size(workspace.folder / "run") > 1000, "births")
+
+
 def test_a_lost_hub_is_told_once_and_its_return(workspace: Workspace) -> None:
     """A coordinator and its agents go on when the hub is back."""
     document = SLOW.replace("2000000", "120").replace("1000", "30000")
