@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatch
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -112,7 +113,8 @@ def send(network: Network, name: str, *numbers: int, wait_s: float = WAIT_S) -> 
     """Send jobs to an agent, together and at once."""
     for number in numbers:
         network.send(number, name, request(number), wait_s)
-    assert network.receive(0.0) == []
+    # An agent of a loaded machine may tell late that it computed.
+    assert {type(event) for event in network.receive(0.0)} <= {Progressed}
 
 
 def line_of(process: subprocess.Popen[str]) -> str:
@@ -287,8 +289,8 @@ def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> No
             status = Path("/proc/self/status").read_text()
             (line,) = [each for each in status.splitlines() if "RssAnon" in each]
             held_kb.append(int(line.split()[1]))
-        # With the longest wait these 6,000 requests would take more than 3,600 kB.
-        assert held_kb[-1] - held_kb[2] < 1000
+        # With the longest wait each turn would take more than 1,200 kB.
+        assert min(later - before for before, later in pairwise(held_kb)) < 300
 
 
 def test_cancelled_job_is_not_done(network: Network) -> None:
