@@ -58,7 +58,7 @@ compiled: $(STAMP)
 # Each process of pytest imports all files that it is given, in ten seconds all of them.
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark and not long'
-	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system and not long' \
+	$(BIN)/python -m pytest -q -n 6 --dist worksteal -m 'system and not long' \
 		$$(grep -rl 'mark\.system' tests --include='test_*.py')
 
 # Tests that are too long for CI: run them before a release and report the results.

@@ -28,6 +28,7 @@ TOP = Path(__file__).parents[2]
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
 
 
+SHIPPED = TOP / "schema" / "experiment" / "shipped"
 NOVELTY = ("novelty.py", "novelty.toml")
 
 
@@ -44,6 +45,13 @@ def _follow(workspace: Workspace, lines: Iterable[str]) -> list[str]:
         workspace.run(*with_one_figure(line.partition("#")[0].split())[1:])
         for line in lines
     ]
+
+
+def _short(document: str) -> str:
+    """Return an experiment with evaluations of four seconds, unless it has its own."""
+    if "[simulation]" in document:
+        return document
+    return f"{document}\n[simulation]\nwindow_steps = 800\n"
 
 
 def _quoted(page: Path, start: str) -> str:
@@ -72,7 +80,9 @@ def test_selection_of_the_selection_page_runs(workspace: Workspace) -> None:
     page = TOP / "docs" / "selection.md"
     module, *_ = blocks_of(page, "python")
     document, *_ = blocks_of(page, "toml")
-    folder = _write(workspace, {"crowding.py": module, "crowding.toml": document})
+    folder = _write(
+        workspace, {"crowding.py": module, "crowding.toml": _short(document)}
+    )
     block, _ = blocks_of(page, "sh")
     check, run = (line.split()[1:] for line in block.strip().splitlines())
     workspace.environment |= {
@@ -98,7 +108,7 @@ def test_archive_of_the_selection_page_is_read_and_begins_a_run(
     workspace: Workspace,
 ) -> None:
     page = TOP / "docs" / "selection.md"
-    _write(workspace, {"kinds.toml": blocks_of(page, "toml")[2]})
+    _write(workspace, {"kinds.toml": _short(blocks_of(page, "toml")[2])})
     words = ("--seed", "0", "--births", "45", "--quiet", "--workers", "2")
     workspace.run("run", "kinds.toml", *words, "--out", "runs/kinds-seed0")
     block = blocks_of(page, "python")[2].replace("at=60", "at=30")
@@ -123,7 +133,7 @@ def test_rule_of_the_selection_page_remembers_per_island_and_run(
     assert [blocks_of(page, kind)[1] for kind in ("python", "toml")] == [
         *files.values()
     ]
-    folder = _write(workspace, files)
+    folder = _write(workspace, files | {NOVELTY[1]: _short(files[NOVELTY[1]])})
     block = blocks_of(page, "sh")[1]
     check, run = (line.split()[1:] for line in block.strip().splitlines())
     assert workspace.run(*check).count("in order") == 3
@@ -189,7 +199,7 @@ def test_experiments_of_the_experiments_page_run(workspace: Workspace) -> None:
     documents = blocks_of(page, "toml")
     assert len(documents) >= 3
     for document in documents:
-        _write(workspace, {"mine.toml": document})
+        _write(workspace, {"mine.toml": _short(document)})
         words = f"--births 20 --in-process --quiet --out out-{len(document)}"
         _follow(workspace, [f"revolve run mine.toml {words}"])
         if "my_parts" not in document:
@@ -200,7 +210,7 @@ def test_experiments_of_the_brains_page_run(workspace: Workspace) -> None:
     """Each runs equally in one process and with two workers."""
     write_module(workspace.folder)
     for document in blocks_of(TOP / "docs" / "brains.md", "toml"):
-        _write(workspace, {"mine.toml": document})
+        _write(workspace, {"mine.toml": _short(document)})
         runs = [f"out-{len(document)}-{number}" for number in range(2)]
         words = "revolve run mine.toml --births 17 --quiet --out"
         hows = (f"{runs[0]} --in-process", f"{runs[1]} --workers 2")
@@ -280,7 +290,12 @@ def test_archipelagos_of_the_islands_page_run(workspace: Workspace) -> None:
     page = TOP / "docs" / "islands.md"
     (document,) = blocks_of(page, "toml")
     _write(workspace, {"mine.toml": document})
-    block, groups, reading = blocks_of(page, "sh")
+    shipped = (SHIPPED / "archipelago-ring.toml").read_text()
+    _write(workspace, {"ring.toml": _short(shipped)})
+    block, groups, reading = (
+        text.replace("run archipelago-ring", "run ring.toml")
+        for text in blocks_of(page, "sh")
+    )
     own = "revolve run mine.toml --births 24 --out mine"
     _follow(workspace, [own, *block.splitlines()])
     told = _follow(workspace, [*groups.splitlines(), *reading.splitlines()])
