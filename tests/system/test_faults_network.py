@@ -63,7 +63,7 @@ def test_disconnecting_a_worker_gives_an_equal_run(
     wait_for_line(fleet.agents["far"], "no hub at")
     assert not fleet.is_over
     far.reconnect()
-    wait_for_line(fleet.agents["far"], "reconnected to")
+    # It may end before the worker has told that it is connected again.
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
