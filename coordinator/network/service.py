@@ -42,6 +42,7 @@ from schema.agent.network import (
 from schema.agent.service import (
     HubWatch,
     Outlet,
+    open_at_hub,
     open_session,
     session_config,
     why_no_hub,
@@ -251,18 +252,17 @@ class Network:
 
     def _open(self) -> zenoh.Session:
         config = session_config(self._config, self._me)
-        while not self._stop.is_set():
-            try:
-                return open_session(config)
-            except zenoh.ZError as error:
-                if self._is_hub:
-                    raise cannot_listen(self.address, str(error)) from None
-                if self._hub.give_up_after_s == math.inf:
-                    line = why_no_hub(self.address, self._hub.tls)
-                    raise NetworkError(line) from None
-            self._hub.seen(())
-            self._stop.wait(_LOOK_S)
-        raise KeyboardInterrupt
+        if not self._is_hub and self._hub.give_up_after_s < math.inf:
+            session = open_at_hub(config, self._hub, self._stop, is_agent=False)
+            if session is None:
+                raise KeyboardInterrupt
+            return session
+        try:
+            return open_session(config)
+        except zenoh.ZError as error:
+            if self._is_hub:
+                raise cannot_listen(self.address, str(error)) from None
+            raise NetworkError(why_no_hub(self.address, self._hub.tls)) from None
 
     def _declare(self) -> None:
         protocol, _, port = parse_address(self.address)

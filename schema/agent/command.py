@@ -121,7 +121,7 @@ SHARED: dict[str, dict[str, Any]] = {
         "default": math.inf,
         "metavar": "S",
         "help": "stop with exit code 1 when no hub has answered for S seconds "
-        "(default: retry for ever; but runs begin only if there is one)",
+        "(default: retry for ever, but a run does not begin without a hub)",
     },
     "--oversubscribe": {
         "action": "store_true",

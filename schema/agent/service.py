@@ -200,6 +200,25 @@ class HubWatch:
         return f"; {shlex.join([*words, '--tls-key', self.tls.key])} tells more"
 
 
+def open_at_hub(
+    config: zenoh.Config, hub: HubWatch, stop: threading.Event, *, is_agent: bool
+) -> zenoh.Session | None:
+    """Return a session as soon as there is a hub; None if stopped before.
+
+    Raises:
+        HubLost: as of ``HubWatch.seen``.
+    """
+    while not stop.is_set():
+        try:
+            return open_session(config, is_agent=is_agent)
+        except zenoh.ZError:
+            # A process that is told to stop meanwhile needs no hub.
+            if not stop.is_set():
+                hub.seen(())
+        stop.wait(_RETRY_S)
+    return None
+
+
 def usable(
     keys: Collection[str], session: zenoh.Session, config: str, within_s: float = 3.0
 ) -> list[str] | None:
@@ -313,7 +332,7 @@ def serve(
         fleet=agent.fleet,
     )
     outlet = outlet or Outlet()
-    session = _open(config, hub, stop)
+    session = open_at_hub(config, hub, stop, is_agent=True)
     if session is not None:
         with session:
             outlet.lead_to(session)
@@ -365,21 +384,6 @@ def _tell_totals(name: str, counts: ReplyCounts) -> None:
 
 def _keep_quiet(_line: str) -> None:
     """Write nothing: the first process of the pool does."""
-
-
-def _open(
-    config: zenoh.Config, hub: HubWatch, stop: threading.Event
-) -> zenoh.Session | None:
-    """Return a session as soon as there is a hub; None if stopped before."""
-    while not stop.is_set():
-        try:
-            return open_session(config, is_agent=True)
-        except zenoh.ZError:
-            # A process that is told to stop meanwhile needs no hub.
-            if not stop.is_set():
-                hub.seen(())
-        stop.wait(_RETRY_S)
-    return None
 
 
 def _serve_session(
