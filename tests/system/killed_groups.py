@@ -23,12 +23,10 @@ from coordinator.cluster.kit import MemberRole
 from coordinator.storage.compare import compare
 from tests.system.documents import RING
 from tests.system.fleet import kit_files, make_kit, size, tls_flags
-from tests.system.machines import Machine, Network
+from tests.system.machines import HOST, Machine, Network
 from tests.system.workspace import Process, Workspace, free_address
 
 BIRTHS = 34
-HOST = "10.231.78.1"
-"""Address of the machine ``hub``."""
 LONGEST_S = 300.0
 LONG_STOP_S = 60.0
 MEAN_GROWTH = 0.2
@@ -58,7 +56,7 @@ class Schedule:
         self.kills = self.cuts = 0
         self.hosts: tuple[Machine, ...] = ()
         self.network = network
-        self.longest_s: list[float] = []
+        self.owes_long_stop = False
         self.prepare()
         self.others = {role: self.start_other(role) for role in self.words}
         self.absent: dict[str, float] = {}
@@ -144,10 +142,11 @@ class Schedule:
     def kill(self, number: int, until_s: float) -> None:
         """Kill or stop a coordinator for some time."""
         self.kills += 1
+        if self.owes_long_stop:
+            until_s = time.monotonic() + LONG_STOP_S
         self.due_s[number] = until_s
-        if self.longest_s or self.rng.random() < STOPPED:
-            if self.longest_s:
-                self.due_s[number] = time.monotonic() + self.longest_s.pop()
+        if self.owes_long_stop or self.rng.random() < STOPPED:
+            self.owes_long_stop = False
             self.running[number].send_signal(signal.SIGSTOP)
         else:
             process = self.running.pop(number)
@@ -180,7 +179,7 @@ class OnMachines(Schedule):
         self.spaces = {"hub": "hub", "analyzer": "hub", "worker": "w"}
         self.coordinators = names
         self.hosts = tuple(self.machines[name] for name in ("w", *names))
-        self.longest_s = [LONG_STOP_S]
+        self.owes_long_stop = True
 
     def start_other(self, role: str) -> Process:
         space = self.machines[self.spaces[role]].space

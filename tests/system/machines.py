@@ -20,6 +20,8 @@ from tests.system.workspace import Workspace, runtime_directory, wait_until
 
 DOMAIN = "example"
 _NET = "10.231.78"
+HOST = f"{_NET}.1"
+"""Address of the first machine of a network."""
 _NAMES = Path("/etc/netns")
 """Folder from which ``ip netns exec`` takes the files that replace those in /etc."""
 _SOURCE = '. "$HOME/.config/revolve/env" && exec "$@"'

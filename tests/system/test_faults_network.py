@@ -17,11 +17,8 @@ from coordinator.cluster.kit import MemberRole
 from coordinator.storage.compare import compare
 from tests.system.documents import SCENARIO1
 from tests.system.fleet import Fleet, kit_files, make_kit, size, tls_flags
-from tests.system.machines import NEEDS_ROOT, Network
+from tests.system.machines import HOST, NEEDS_ROOT, Network
 from tests.system.workspace import Workspace, wait_until
-
-HOST = "10.231.78.1"
-"""Address of the machine ``hub``."""
 
 pytestmark = [
     pytest.mark.system,
@@ -57,13 +54,15 @@ def test_disconnecting_a_worker_gives_an_equal_run(
     where = {"listen": f"tls/{HOST}:7447", "inside": near.space}
     fleet = Fleet(workspace, *SCENARIO1, *tls["hub"], **where)
     fleet.join("far", "worker", *tls["far"], inside=far.space)
+    # It may have told that there is no hub: over a bad cable not every try succeeds.
+    wait_for_line(fleet.agents["far"], "connected to")
     fleet.join("judge", "analyzer", *tls["judge"], inside=near.space)
     fleet.wait_for(np.random.default_rng(31).uniform(0.1, 0.7) * size(undisturbed))
     far.cut()
     wait_for_line(fleet.agents["far"], "no hub at")
     assert not fleet.is_over
     far.reconnect()
-    # It may end before the worker has told that it is connected again.
+    wait_for_line(fleet.agents["far"], "reconnected to")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
