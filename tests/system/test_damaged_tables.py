@@ -109,7 +109,7 @@ def test_lost_poses_are_simulated_again_by_worker_processes(
 
 
 def test_readers_find_random_flips(kinds: dict[str, Path], tmp_path: Path) -> None:
-    assert read_flipped(kinds, tmp_path, 30, 1) == 30
+    assert read_flipped(kinds, tmp_path, 60, 1) == 60
 
 
 @pytest.mark.long

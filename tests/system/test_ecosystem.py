@@ -27,7 +27,7 @@ Pair = tuple[int, int]
     ("document", "before", "births"),
     [
         pytest.param(POND, 30, 45, id="ecosystem"),
-        pytest.param(PONDS, 30, 40, id="ring of two", marks=pytest.mark.long),
+        pytest.param(PONDS, 30, 40, id="ring of two"),
         pytest.param((EXAMPLES / "predators.toml").read_text(), 20, 40, id="predators"),
     ],
 )

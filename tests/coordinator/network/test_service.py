@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from fnmatch import fnmatch
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 
 import pytest
 import zenoh
@@ -290,7 +291,8 @@ def test_the_memory_of_requests_is_free_after_their_wait(network: Network) -> No
             (line,) = [each for each in status.splitlines() if "RssAnon" in each]
             held_kb.append(int(line.split()[1]))
         # With the longest wait each turn would take more than 1,200 kB.
-        assert min(later - before for before, later in pairwise(held_kb)) < 300
+        growth_kb = [later - before for before, later in pairwise(held_kb)]
+        assert median(growth_kb) < 300
 
 
 def test_cancelled_job_is_not_done(network: Network) -> None:
