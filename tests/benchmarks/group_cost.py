@@ -4,14 +4,11 @@
 four coordinators, beside one hub, one analyzer and workers that answer at once. It
 prints the CPU time per birth of all coordinators together: the difference between a
 long run and a short one, so that their start does not count. While they run it asks
-for their progress, and prints what each group did: the share of answers in which it
-waited for migrants, by epochs, and those in which it waited for nothing.
+for their progress, and prints how often each group worked, or waited for migrants.
 """
 
 import argparse
 import os
-import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
@@ -28,6 +25,7 @@ from schema.errors import NetworkError
 from schema.wire.codec import encode
 from schema.wire.operator import GetStatus, OperatorRequest, decode_operator_reply
 from tests import analyzers, null_workers
+from tests.system.workspace import Process, Workspace
 
 RING = """
 name = "ring"
@@ -44,6 +42,8 @@ epoch = 60
 SHORT, LONG = 90, 690
 """Births of each of the eight islands."""
 _LOOK_S = 0.1
+# How to ask whether a process has ended, so that its CPU time can be read later.
+_ALIVE = os.WEXITED | os.WNOHANG | os.WNOWAIT
 
 _say = partial(print, flush=True)
 
@@ -54,17 +54,18 @@ def run(place: Path, births: int, groups: int) -> tuple[float, list[str]]:
     (place / "ring.toml").write_text(RING.format(births=births))
     address = new_socket()
     with ExitStack() as stack:
-        hub = start(place, "hub", "--listen", address)
+        workspace = Workspace(place)
+        hub = workspace.start("hub", "--listen", address, log=place / "hub.log")
         stack.callback(hub.wait)
         stack.callback(hub.terminate)
         agent = Agent("worker", "null", address)
         judge = Agent("analyzer", "judge", address)
         coordinators = [
-            start(
-                place,
+            workspace.start(
                 *("coordinator", "ring.toml", "--seed", "1", "--quiet"),
                 *("--group", f"{number}/{groups}", "--out", f"all/group-{number}"),
                 *("--connect", address, "--give-up-after", "60"),
+                log=place / f"{number}.log",
             )
             for number in range(groups)
         ]
@@ -78,17 +79,7 @@ def run(place: Path, births: int, groups: int) -> tuple[float, list[str]]:
     return cpu_s, trace
 
 
-def start(place: Path, *words: str) -> subprocess.Popen[bytes]:
-    """Start ``revolve``."""
-    command = (sys.executable, "-m", "revolve", *words)
-    top = str(Path(__file__).parents[2])
-    environment = {**os.environ, "PYTHONPATH": top}
-    return subprocess.Popen(
-        command, cwd=place, env=environment, stdout=subprocess.DEVNULL
-    )
-
-
-def ended(process: subprocess.Popen[bytes]) -> float:
+def ended(process: Process) -> float:
     """Wait for a process; return its CPU time [s]."""
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
@@ -96,7 +87,7 @@ def ended(process: subprocess.Popen[bytes]) -> float:
     return used.ru_utime + used.ru_stime
 
 
-def watch(address: str, processes: list[subprocess.Popen[bytes]]) -> list[str]:
+def watch(address: str, processes: list[Process]) -> list[str]:
     """Ask for the progress of groups until they have ended; return what they did."""
     seen: dict[int, Counter[str]] = {}
     question = encode(OperatorRequest("trace", 0, GetStatus()))
@@ -121,9 +112,6 @@ def watch(address: str, processes: list[subprocess.Popen[bytes]]) -> list[str]:
                         done = "waits for migrants" if waits else "works"
                     seen.setdefault(one.group.number, Counter())[done] += 1
     return [f"group {number}: {dict(seen[number])}" for number in sorted(seen)]
-
-
-_ALIVE = os.WEXITED | os.WNOHANG | os.WNOWAIT
 
 
 def main(turns: int, most: int) -> None:
