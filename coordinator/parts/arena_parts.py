@@ -23,7 +23,7 @@ AGAIN = 1 << 16
 """Number of the part that is advanced again."""
 EXCHANGE_S = 1.0
 """Longest duration of an exchange at first, and after a repeat [s]."""
-MOST_TIMES = 4
+MOST_TIMES = 8
 """After exchanges without a repeat they may become longer, up to so many times."""
 REACH_M = 0.2
 """Half the side of the box of a robot that has swept none yet [m]."""
