@@ -140,7 +140,9 @@ MOST_MJCF_BYTES = 6_000_000
 MOST_SETTINGS_BYTES = 4_000_000
 """Size of the settings in a request: they hold the scenery of an island as JSON."""
 MOST_NODES = 100_000
-"""Values in a YAML document, elements in an XML one."""
+"""Values in a YAML document."""
+MOST_XML_TAGS = 50_000
+"""Tags of an XML document: one or two for each element."""
 MOST_XML_ATTRIBUTES = 200_000
 """Attributes in an XML document."""
 MOST_DEPTH = 400

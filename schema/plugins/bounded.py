@@ -14,9 +14,9 @@ from schema.limits import (
     MOST_DEPTH,
     MOST_DIGITS,
     MOST_KEY_PARTS,
-    MOST_NODES,
     MOST_TEXT_BYTES,
     MOST_XML_ATTRIBUTES,
+    MOST_XML_TAGS,
 )
 
 # ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
@@ -94,7 +94,7 @@ def parse_xml(
     # Counted before parsing; text that holds these signs counts, too.
     for name, count, limit in (
         ("characters", len(text), most),
-        ("elements", text.count("<"), 2 * MOST_NODES),
+        ("tags", text.count("<"), MOST_XML_TAGS),
         ("attributes", text.count("="), MOST_XML_ATTRIBUTES),
     ):
         if count > limit:
