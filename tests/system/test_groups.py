@@ -94,10 +94,12 @@ def test_one_command_runs_all_groups(workspace: Workspace) -> None:
     started = workspace.start(*words, "--workers", "2", "--out", "three")
     folders = [workspace.folder / "three" / f"group-{number}" for number in range(3)]
     wait_until(lambda: size(folders[2]) > 0.1 * size(whole), "births")
+    states = [each / "state" for each in folders]
+    wait_until(lambda: all(state.exists() for state in states), "all groups run")
     started.terminate()
     started.communicate()
     assert started.returncode == 130
-    assert {(each / "state").read_text() for each in folders} == {"stopped"}
+    assert {state.read_text() for state in states} == {"stopped"}
     told = workspace.run("status", "three")
     assert "0 of 3 runs finished" in told
     assert "to continue: revolve resume three --workers 2\n" in told
