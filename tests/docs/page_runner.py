@@ -24,6 +24,8 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+from tests.command import command
+
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _FILE = re.compile(r"# ([\w-]+\.(?:py|toml))\n")
 _NO_ENGINE = "pictures need"
@@ -98,11 +100,10 @@ def _command(line: str, numbers: dict[str, str]) -> str:
     if words[:2] == ["revolve", "run"] and "--workers" not in words:
         words += ["--in-process"]
     words = with_one_figure(words)
-    program = ["-m", "revolve"] if words[0] == "revolve" else []
+    program = command() if words[0] == "revolve" else [sys.executable]
     done = subprocess.run(
-        [sys.executable, *program, *words[1:]],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [*program, *words[1:]], capture_output=True, text=True, check=False
+    )
     said = done.stdout + done.stderr
     if "render" in words and _NO_ENGINE in said:
         return _NO_ENGINE

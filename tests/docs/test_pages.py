@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.command_server import ADDRESS, address
 from tests.docs.page_runner import PageError, blocks, blocks_of, run_page
 from tests.system.workspace import runtime_directory
 
@@ -24,7 +25,7 @@ def _run(page: Path, folder: Path, *numbers: str) -> None:
     done = subprocess.run(
         [sys.executable, str(script), str(page), *numbers],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": paths},
+        env={**os.environ, "PYTHONPATH": paths, ADDRESS: address()},
         capture_output=True,
         text=True,
         check=False,

@@ -15,6 +15,8 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 
+from tests.command import command
+
 PATIENCE_S = 240.0
 Process = Any
 """A ``subprocess.Popen[str]``; mypy does not know that its pipes are there."""
@@ -102,7 +104,9 @@ class Workspace:
 
     def run(self, *words: str, code: int = 0) -> str:
         """Run ``revolve`` to its end; return standard output and standard error."""
-        return self.python("-m", "revolve", *words, code=code)
+        if self.environment:
+            return self.python("-m", "revolve", *words, code=code)
+        return self._finish(*command(), *words, code=code)
 
     def finished(self, document: str, births: int, name: str) -> Path:
         """Run a document to its end, in one process; return the run's folder."""
@@ -113,7 +117,10 @@ class Workspace:
 
     def python(self, *words: str, code: int = 0) -> str:
         """Run Python with arguments to its end; return all that it writes."""
-        process = self.start_command(sys.executable, *words)
+        return self._finish(sys.executable, *words, code=code)
+
+    def _finish(self, *words: str, code: int) -> str:
+        process = self.start_command(*words)
         out, err = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == code, f"{words}: {process.returncode}\n{out}{err}"
         told: str = out + err

@@ -1,0 +1,45 @@
+"""The command ``revolve`` of tests, as a fork of a server that has all its modules.
+
+A start takes a twentieth of a second instead of half a one or, with figures, of two.
+Otherwise the command is one of a new interpreter: a process of its own that leads a
+session, with the folder, environment and open files of whoever starts it, and agents
+that are new interpreters. On systems other than Linux it is a new interpreter itself.
+
+As a program, this file sends its files to the server, waits for the command, and exits
+with its code. If it is killed, so is the command.
+"""
+
+import json
+import os
+import socket
+import sys
+
+MOST_BYTES = 1 << 18
+"""Size of a request, whose largest part is the environment [bytes]."""
+
+
+def command() -> list[str]:
+    """Return the words that start ``revolve``, before its arguments."""
+    if sys.platform != "linux":
+        return [sys.executable, "-m", "revolve"]
+    from tests import command_server  # not for the program, which imports little
+
+    return [sys.executable, "-IS", __file__, command_server.address()]
+
+
+def _ask(address: str, words: list[str]) -> int:
+    """Let the server execute a command with the files of this process."""
+    folder = os.getcwd()  # noqa: PTH109 - pathlib would be half of the start
+    request = json.dumps([words, folder, dict(os.environ)])
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_BYTES)
+        server.connect(address)
+        socket.send_fds(server, [request.encode()], [0, 1, 2])
+        code = int(server.recv(64))
+    if code < 0:
+        os.kill(os.getpid(), -code)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(_ask(sys.argv[1], sys.argv[2:]))
