@@ -51,10 +51,13 @@ def address() -> str:
         stdout=subprocess.PIPE,
         cwd=top,
         env={**os.environ, "PYTHONPATH": top},
+        start_new_session=True,  # Ctrl-C is for pytest, whose end it sees
     )
+    assert server.stdin is not None
     assert server.stdout is not None
     assert server.stdout.readline() == b"ready\n"
-    atexit.register(server.kill)
+    atexit.register(server.wait)
+    atexit.register(server.stdin.close)
     return path
 
 
@@ -81,6 +84,8 @@ class _Server:
         while True:
             for key, _ in self._waiting.select():
                 if key.fileobj == 0:
+                    for other in self._waiting.get_map().values():
+                        self._kill(other)
                     return
                 if key.fileobj is self._listener:
                     if self._accept():
@@ -88,8 +93,7 @@ class _Server:
                 elif isinstance(key.fileobj, socket.socket):
                     # The client is gone, as otherwise it sends nothing more.
                     self._waiting.unregister(key.fileobj)
-                    with suppress(ProcessLookupError):
-                        os.killpg(key.data, signal.SIGKILL)
+                    self._kill(key)
                 else:
                     self._end(key.fd, *key.data)
 
@@ -133,6 +137,13 @@ class _Server:
             importlib.reload(sys.modules["mujoco.rendering.classic.gl_context"])
         sys.argv[1:] = words
         sys.path[0] = folder
+
+    @staticmethod
+    def _kill(client: selectors.SelectorKey) -> None:
+        """Kill the command of a client, with the processes of its group."""
+        if isinstance(client.data, int):
+            with suppress(ProcessLookupError):
+                os.killpg(client.data, signal.SIGKILL)
 
     def _end(self, ended: int, process: int, client: socket.socket) -> None:
         """Tell a client the exit code of its command."""

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -34,6 +35,13 @@ pathlib.Path("seen.new").write_text(json.dumps({
     "process": os.getpid(),
 }))
 os.rename("seen.new", "seen")
+"""
+STARTER = """
+import signal
+from tests.command import command
+
+print(command()[-1], flush=True)
+signal.pause()
 """
 WORDS = ("plugins", "--plugins", "own.py")
 
@@ -68,11 +76,34 @@ def test_forked_command_has_files_folder_and_environment_of_a_new_one(
     assert _seen(tmp_path, *command()) == new
 
 
+def _waiting(folder: Path, server: list[str]) -> tuple[subprocess.Popen[bytes], Path]:
+    """Return the client of a command that waits for ever, and where it is listed."""
+    (folder / "own.py").write_text(f"{OWN}\nimport signal; signal.pause()")
+    client = _start(folder, *server)
+    wait_until((folder / "seen").exists, "the command is at its plug-in")
+    process = json.loads((folder / "seen").read_text())["process"]
+    return client, Path(f"/proc/{process}")
+
+
 def test_command_is_killed_with_its_client(tmp_path: Path) -> None:
-    (tmp_path / "own.py").write_text(f"{OWN}\nimport signal; signal.pause()")
-    client = _start(tmp_path, *command())
-    wait_until((tmp_path / "seen").exists, "the command is at its plug-in")
-    process = json.loads((tmp_path / "seen").read_text())["process"]
+    client, process = _waiting(tmp_path, command())
     client.kill()
     client.wait()
-    wait_until(lambda: not Path(f"/proc/{process}").exists(), "the command ends")
+    wait_until(lambda: not process.exists(), "the command ends")
+
+
+def test_command_is_killed_with_whoever_started_its_server(tmp_path: Path) -> None:
+    tests = subprocess.Popen(
+        [sys.executable, "-c", STARTER],
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert tests.stdout is not None
+    socket = tests.stdout.readline().strip()
+    client, process = _waiting(tmp_path, [*command()[:-1], socket])
+    tests.kill()
+    tests.communicate()
+    assert client.wait() != 0
+    wait_until(lambda: not process.exists(), "the command ends")
+    shutil.rmtree(Path(socket).parent)
