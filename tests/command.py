@@ -1,9 +1,9 @@
 """The command ``revolve`` of tests, as a fork of a server that has all its modules.
 
-A start takes a twentieth of a second instead of half a one or, with figures, of two.
-Otherwise the command is one of a new interpreter: a process of its own that leads a
-session, with the folder, environment and open files of whoever starts it, and agents
-that are new interpreters. On systems other than Linux it is a new interpreter itself.
+A start takes 50 ms instead of half a second or, with figures, two seconds. Otherwise
+the command is one of a new interpreter: a process that leads a session of its own. It
+has the folder, environment and open files of the process that starts it. Its agents are
+new interpreters. On systems other than Linux so is the command itself.
 
 As a program, this file sends its files to the server, waits for the command, and exits
 with its code. If it is killed, so is the command.

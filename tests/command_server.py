@@ -1,7 +1,7 @@
 """Server of ``tests/command.py``: it forks for each command.
 
-It has one thread, no session of the network and nothing drawn, as these do not survive
-a fork. It ends with the process that has started it.
+It has one thread, no session of the network and no library of graphics, as these do not
+survive a fork. It ends with the process that started it.
 """
 
 import atexit
@@ -30,8 +30,6 @@ _OF_ARROW = "jemalloc_bg_thd"
 """Thread of Arrow's allocator, which starts again in a fork."""
 _DRAWING = ("analyze", "robot")
 """Commands that choose a library of graphics before they import MuJoCo."""
-
-
 ADDRESS = "REVOLVE_COMMAND_SERVER"
 """Environment variable: socket of the server of the process that started this one."""
 
@@ -131,7 +129,7 @@ class _Server:
         os.environ.clear()
         os.environ.update(environment)
         if words[0] in _DRAWING:
-            # Done when MuJoCo is first imported, elsewhere.
+            # A new interpreter does this when it first imports MuJoCo.
             engine = importlib.import_module("analysis.render.stage")._installed()
             os.environ.setdefault(GRAPHICS, engine or NO_GRAPHICS)
             importlib.reload(sys.modules["mujoco.rendering.classic.gl_context"])
