@@ -152,7 +152,9 @@ def own_processes(deployment: Deployment, address: str) -> Iterator[list[Process
                 processes=size,
             )
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
-            pools.append(stack.enter_context(pool))
+            pools.append(pool)
+        for pool in pools:
+            stack.enter_context(pool)
         # All at once before one is waited for: their grace times run together.
         for pool in pools:
             stack.callback(pool.terminate)

@@ -1,9 +1,10 @@
 """A pool of processes that one process starts, supervises and stops.
 
-Processes are spawned, never forked: the network does not survive a fork. A process
-that ends is restarted. If it exited by itself outside a job, the restart is delayed,
-longer each time while it exits soon after its start. No process outlives its parent.
-The new process of a slot is told which jobs crashed the earlier ones.
+In Linux processes are forks of a server: a new interpreter that has imported their code
+but has no network session, as none survives a fork. A process that ends is restarted.
+If it exited by itself outside a job, the restart is delayed, longer each time while it
+exits soon after its start. No process outlives its parent. The new process of a slot is
+told which jobs crashed the earlier ones.
 """
 
 import contextlib
@@ -17,8 +18,9 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from multiprocessing import connection, get_context, parent_process, resource_tracker
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from typing import Any, Self
 
 from schema.agent.import_path import SAFE_PATH, check_graphics
@@ -55,6 +57,14 @@ _MAP_OPTION = -3
 # Arrow's own allocator keeps what tables needed once, in each of its threads: 40 to
 # 80 MB more at the end of a run.
 _ARROW_POOL = "system"
+# A fork starts in milliseconds and shares the memory of what is imported. Elsewhere
+# libraries of the system may not survive it.
+_CONTEXT = (
+    get_context("forkserver") if sys.platform == "linux" else get_context("spawn")
+)
+_CODE = set[str]()
+"""Modules that the server imports when the first pool starts."""
+_UNKNOWN_CODE = 255
 MOST_PER_CORE = 4
 """Processes per core that are started without being told twice."""
 GRACE_S = 2.5
@@ -105,6 +115,31 @@ def most_processes() -> int:
     return MOST_PER_CORE * cores()
 
 
+def _modules(body: Callable[..., object]) -> set[str]:
+    """Return the modules of a function and of what is bound to it."""
+    if not isinstance(body, partial):
+        return {body.__module__}
+    bound = (body.func, *body.args, *body.keywords.values())
+    return set().union(*map(_modules, bound))
+
+
+def _exit_code(process: BaseProcess) -> int:
+    """Return the exit code of a process that has ended, or whose server has.
+
+    Python takes the end of the server for that of its forks, with code 255. They run
+    on, without anybody who learns how they end, and so they are killed.
+    """
+    assert process.exitcode is not None
+    assert process.pid is not None
+    if process.exitcode != _UNKNOWN_CODE:
+        return process.exitcode
+    try:
+        os.kill(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return process.exitcode
+    return -signal.SIGKILL
+
+
 @dataclass(slots=True)
 class _Place:
     """A slot, its process if one is running, and when to start the next one.
@@ -117,7 +152,7 @@ class _Place:
     """
 
     slot: ProcessSlot
-    process: SpawnProcess | None = None
+    process: BaseProcess | None = None
     started_s: float = -math.inf
     due_s: float = -math.inf
     pause_s: float = _BETWEEN_STARTS_S
@@ -138,7 +173,8 @@ class ProcessPool:
         self._body = body
         self._arguments = arguments
         self._what = f"a{'n' * (role[0] in 'aeiou')} {role} process ended"
-        self._context = get_context("spawn")
+        _CODE.update(_modules(body))
+        _CONTEXT.set_forkserver_preload(sorted(_CODE))
         slots = (ProcessSlot(index, CurrentJob()) for index in range(size))
         self._places = [_Place(slot) for slot in slots]
         self._until_s: float | None = None
@@ -160,7 +196,7 @@ class ProcessPool:
         return [place.code for place in self._places if place.code is not None]
 
     @property
-    def _processes(self) -> list[SpawnProcess]:
+    def _processes(self) -> list[BaseProcess]:
         return [place.process for place in self._places if place.process]
 
     def look_after(self) -> list[str]:
@@ -169,11 +205,13 @@ class ProcessPool:
         lines = []
         for place in self._places:
             if place.process is not None and place.process.exitcode is not None:
-                why = self._note_end(place, place.process.exitcode, now_s)
+                why = self._note_end(place, _exit_code(place.process), now_s)
                 lines.append(f"{self._what}{why}; it is restarted")
             if place.process is None and now_s >= place.due_s:
                 place.started_s, place.code = now_s, None
                 place.process = self._start(place.slot)
+                if place.process is None:
+                    place.due_s = now_s + _BETWEEN_STARTS_S
         return lines
 
     def _note_end(self, place: _Place, code: int, now_s: float) -> str:
@@ -198,11 +236,13 @@ class ProcessPool:
         place.slot = replace(slot, deaths=deaths)
         return f": {task.agent} died of job {task.number} of {task.run}: {cause}"
 
-    def _start(self, slot: ProcessSlot) -> SpawnProcess:
-        process = self._context.Process(
-            target=self._body, args=(*self._arguments, slot)
-        )
-        start_without_ctrl_c(process)
+    def _start(self, slot: ProcessSlot) -> BaseProcess | None:
+        """Return a new process; None if the server is killed at this moment."""
+        process = _CONTEXT.Process(target=self._body, args=(*self._arguments, slot))
+        try:
+            start_without_ctrl_c(process)
+        except (ConnectionError, EOFError):
+            return None
         return process
 
     def wait(self, timeout_s: float) -> None:
@@ -264,7 +304,7 @@ def stop_with_input(stop: Callable[[], object]) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def start_without_ctrl_c(process: SpawnProcess) -> None:
+def start_without_ctrl_c(process: BaseProcess) -> None:
     """Start a process that a Ctrl-C in the terminal does not reach.
 
     The terminal sends it to all processes; only this one may act on it.

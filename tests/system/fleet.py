@@ -4,7 +4,7 @@ import os
 import shutil
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -53,16 +53,15 @@ def holders(folder: Path) -> list[str]:
 
 def agent_processes(pid: int) -> list[int]:
     """Return the agent processes of a command, oldest first."""
-    listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8").split()
-    return [int(child) for child in listing if b"spawn_main" in _command_line(child)]
+    return sorted(agent for server in children(pid) for agent in children(server))
 
 
-def _command_line(pid: str) -> bytes:
-    """Return the command line of a process; empty if the process has ended."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes()
-    except (FileNotFoundError, ProcessLookupError):
-        return b""
+def children(pid: int) -> list[int]:
+    """Return the processes that a process has started; none if it has ended."""
+    with suppress(FileNotFoundError, ProcessLookupError):
+        listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8")
+        return [int(word) for word in listing.split()]
+    return []
 
 
 class Fleet:

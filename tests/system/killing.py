@@ -36,7 +36,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.system.fleet import size
+from tests.system.fleet import agent_processes, size
 from tests.system.instants import JOURNAL, RECOVERY, Instants
 from tests.system.killed_runs import (
     FLAGS,
@@ -211,7 +211,7 @@ class FleetKills:
 
     @property
     def _agents(self) -> list[int]:
-        return [agent for pool in self._pools for agent in warm.agents(pool)]
+        return [agent for pool in self._pools for agent in agent_processes(pool)]
 
     def _draw(self, left: Counter[str]) -> str:
         """Return the role of the next process to kill."""

@@ -6,7 +6,6 @@ command is a process of its own, which SIGKILL ends like any other.
 """
 
 import ctypes
-import multiprocessing
 import os
 import signal
 import sys
@@ -78,13 +77,7 @@ def _run(words: list[str]) -> int:
 
 
 def _hurry() -> None:
-    """Fork agents from a server, too, and flush tables more often than once a second.
-
-    The server is a new interpreter: forks of it have no session of this process.
-    """
-    supervisor.get_context = lambda _: (  # type: ignore[attr-defined,assignment]
-        multiprocessing.get_context("forkserver")
-    )
+    """Flush tables more often than once a second."""
     main_loop._CHORES_S = 0.05
 
 
@@ -119,20 +112,6 @@ def kill(process: int) -> int:
     with suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-
-
-def agents(pool: int) -> list[int]:
-    """Return the agent processes of a ``worker`` or ``analyzer`` command."""
-    return sorted(
-        agent for server in _children(pool) for agent in _children(server)
-    )  # fmt: skip
-
-
-def _children(process: int) -> list[int]:
-    with suppress(FileNotFoundError, ProcessLookupError):
-        listing = Path(f"/proc/{process}/task/{process}/children").read_text("utf-8")
-        return [int(word) for word in listing.split()]
-    return []
 
 
 def tail(log: Path) -> str:

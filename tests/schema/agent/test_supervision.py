@@ -130,6 +130,32 @@ def test_process_that_exits_by_itself_is_restarted_later_each_time(
         assert time.monotonic() - began_s > 3.0
 
 
+def work(folder: str, slot: ProcessSlot) -> None:
+    """Do a job that never ends, and note the number of crashes so far."""
+    assert slot.note is not None
+    slot.note.begin(TASK)
+    Path(folder, f"{os.getpid()}").write_text(f"{os.getppid()} {len(slot.deaths)}")
+    time.sleep(PATIENCE_S)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="others spawn processes")
+def test_forks_end_with_their_server_and_no_job_is_blamed(tmp_path: Path) -> None:
+    def known() -> list[Path]:
+        return [one for one in tmp_path.iterdir() if one.read_text()]
+
+    with ProcessPool(work, (str(tmp_path),), size=2) as process_pool:
+        until(process_pool, lambda: len(known()) == 2)
+        first = known()
+        (server,) = {int(one.read_text().split()[0]) for one in first}
+        os.kill(server, signal.SIGKILL)
+        until(process_pool, lambda: len(known()) == 4)
+        assert {one.read_text().split()[1] for one in known()} == {"0"}
+        # Without arguments: a process that has ended but that nobody waited for.
+        lines = [Path("/proc", one.name, "cmdline") for one in first]
+        assert not any(line.exists() and line.read_bytes() for line in lines)
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_the_user_is_told_once_of_a_process_that_was_killed() -> None:
