@@ -27,7 +27,6 @@ from coordinator.storage.hints import command, stopped
 from schema.agent.log import tell_error, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import (
-    GRACE_S,
     start_without_ctrl_c,
     stop_on_signals,
     stop_with_parent,
@@ -59,6 +58,8 @@ _WITH_VALUE = (
 """Flags with a value that each group's coordinator gets."""
 _NO_STATUS = Status((), 0, 0, 0.0)
 _TURN_S = 1.0
+_STOP_S = 30.0
+"""Time for coordinators to write their tables, on a busy machine as well [s]."""
 _HUB_S = 30.0
 """Time without a hub after which a coordinator of a group ends [s]."""
 
@@ -218,7 +219,7 @@ def _take_ended(running: dict[Path, SpawnProcess]) -> dict[Path, int]:
 
 def _end(running: dict[Path, SpawnProcess]) -> None:
     """Let processes stop so that they can be resumed; kill those that take long."""
-    until_s = time.monotonic() + GRACE_S
+    until_s = time.monotonic() + _STOP_S
     for process in running.values():
         process.terminate()
     for process in running.values():
