@@ -81,6 +81,8 @@ class _Server:
         """Answer until standard input ends; return in each process of a command."""
         while True:
             for key, _ in self._waiting.select():
+                if self._waiting.get_map().get(key.fd) is not key:
+                    continue  # Its command has ended in this turn.
                 if key.fileobj == 0:
                     for other in self._waiting.get_map().values():
                         self._kill(other)
@@ -140,6 +142,8 @@ class _Server:
     def _kill(client: selectors.SelectorKey) -> None:
         """Kill the command of a client, with the processes of its group."""
         if isinstance(client.data, int):
+            # It may not lead its group yet.
+            os.kill(client.data, signal.SIGKILL)
             with suppress(ProcessLookupError):
                 os.killpg(client.data, signal.SIGKILL)
 
