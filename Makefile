@@ -54,12 +54,13 @@ demo: $(NEEDED)
 compiled: $(STAMP)
 	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve
 
-# Unit tests, two at a time; then system tests, which start processes and often wait.
+# Unit tests, of which some wait for the disk; then system tests, which start processes
+# and often wait.
 # Each process of pytest imports all files that it is given, in ten seconds all of them,
 # or in six if it finds them compiled.
 test: export PYTHONDONTWRITEBYTECODE =
 test: compiled
-	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark and not long'
+	$(BIN)/python -m pytest -q -n 3 -m 'not system and not benchmark and not long'
 	$(BIN)/python -m pytest -q -n 5 --dist worksteal -m 'system and not long' \
 		$$(grep -rl 'mark\.system' tests --include='test_*.py')
 
