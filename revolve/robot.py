@@ -75,7 +75,8 @@ class Robot:
         """Return the robot of a file.
 
         Args:
-            path: ends in .yaml, .yml, .pb, .xml, .robot, .txt or .json.
+            path: ends in .yaml, .yml, .pb, .xml, .robot, .txt or .json; a run folder
+                stands for its ``best.yaml``.
             experiment: whose part types are allowed, and whose simulation and fitness
                 apply, those of island 0; None, as of the commands: the settings in an
                 MJCF or packed file, else those of the run folder that holds the file,

@@ -69,7 +69,9 @@ def parser(_command: str = "robot") -> Flags:
                 f"revolve robot {name} wheeled.yaml{outputs[1]} --experiment mine.toml",
             ),
         )
-        command.add_argument("file", type=Path, metavar="FILE", help="robot file")
+        command.add_argument(
+            "file", type=Path, metavar="FILE|RUN", help="robot file, or run folder"
+        )
         if name == "convert":
             command.add_argument(
                 "output", type=Path, metavar="OUTPUT", help="robot file to write"

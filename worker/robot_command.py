@@ -129,7 +129,9 @@ def parser(_command: str = "robot simulate") -> Flags:
             "revolve robot simulate best.xml",
         ),
     )
-    flags.add_argument("file", type=Path, metavar="FILE", help="robot file")
+    flags.add_argument(
+        "file", type=Path, metavar="FILE|RUN", help="robot file, or run folder"
+    )
     add_settings(
         flags,
         "those in an MJCF or a packed file, else those of the run folder that holds "

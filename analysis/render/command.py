@@ -14,7 +14,6 @@ from analysis.render.picture import RobotRenderer, Simulate
 from schema.agent.log import tell_user
 from schema.experiment.document import steps_of
 from schema.experiment.settings import EvaluationSettings
-from schema.formats.files import BEST
 from schema.formats.run_settings import read_with_settings
 from schema.plugins.permission import allow
 from schema.robot.trace import Floats
@@ -104,14 +103,10 @@ def read_shown(options: argparse.Namespace) -> Shown:
     """
     shown: Shown = {}
     for file in options.files:
-        is_run = (file / BEST).is_file()
         robot, settings, _ = read_with_settings(
-            file / BEST if is_run else file,
-            options.experiment,
-            options.island,
-            tells_default=not shown,
+            file, options.experiment, options.island, tells_default=not shown
         )
-        name = file.resolve().name if is_run else file.stem
+        name = file.resolve().name if file.is_dir() else file.stem
         shown[name if name not in shown else str(file)] = robot, settings
     if len(shown) < len(options.files):
         raise NoPictures("several robots: each file may be given once")

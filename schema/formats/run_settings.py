@@ -90,18 +90,21 @@ def read_with_settings(
 ) -> tuple[Robot, EvaluationSettings, Experiment | None]:
     """Return a file's robot, its evaluation settings and their experiment.
 
-    An MJCF file and a packed robot hold their settings: they apply unless the user
-    named an experiment, also in the folder of a run. There, other files have the
-    experiment of the run, and its plug-ins may be imported as when the run is viewed.
-    An island that is not named is, of ``best.yaml`` of a run, that on which it has its
-    fitness, and of other files island 0. Of an MJCF file's own settings and of the
-    default ones, the experiment is None. ``say`` gets a line about the settings; if
-    ``tells_default``, also of the default ones.
+    A run folder stands for its file ``best.yaml``, if it has one. An MJCF file and a
+    packed robot hold their settings: they apply unless the user named an experiment,
+    also in the folder of a run. There, other files have the experiment of the run, and
+    its plug-ins may be imported as when the run is viewed. An island that is not named
+    is, of ``best.yaml`` of a run, that on which it has its fitness, and of other files
+    island 0. Of an MJCF file's own settings and of the default ones, the experiment is
+    None. ``say`` gets a line about the settings; if ``tells_default``, also of the
+    default ones.
 
     Raises:
         RevolveError: no well-formed robot in the file; an invalid experiment, island or
             plug-in; a damaged description or table of the run.
     """
+    if (file / BEST).is_file():
+        file /= BEST
     # First: nothing is said about the settings of a file that is not there.
     ending = check_file(file)
     if ending == MJCF_ENDING and named is None and island is None:

@@ -121,7 +121,7 @@ MISTAKES = [
     ("robot check open.yaml", "open.yaml"),
     ("robot check robot.pb", "robot.pb"),
     ("robot simulate nowhere.yaml", "nowhere.yaml: cannot be read: No such file"),
-    ("robot simulate run", "run: must be the file of a robot, got a folder"),
+    ("robot simulate .", ".: must be the file of a robot, got a folder"),
     ("robot simulate key.toml", "key.toml: must end in one of .yaml, .yml, "),
     ("run thesis scenario1", "must have different names"),
     ("run scenario1 --repeats 0", "--repeats: must be a whole number >= 1"),

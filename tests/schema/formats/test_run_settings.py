@@ -55,6 +55,21 @@ def test_file_in_a_run_folder_has_the_world_of_the_run(
     assert capsys.readouterr() == ("", line)
 
 
+def test_run_folder_stands_for_its_best_robot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path / "run", BUMPY)
+    with pytest.raises(InvalidRobot, match="got a folder"):
+        read_with_settings(file.parent, None)
+    write_robot(robot_of(), file)
+    found = read_with_settings(file.parent, None)
+    told = capsys.readouterr().err
+    assert found == read_with_settings(file, None)
+    assert found[1].environment.roughness_m == 0.04
+    assert told == capsys.readouterr().err
+    assert main(["robot", "check", str(file.parent)]) == 0
+
+
 def test_named_experiment_comes_before_that_of_the_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
