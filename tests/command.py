@@ -6,7 +6,8 @@ has the folder, environment and open files of the process that starts it. Its ag
 new interpreters. On systems other than Linux so is the command itself.
 
 As a program, this file sends its files to the server, waits for the command, and exits
-with its code. If it is killed, so is the command.
+with its code. If it is killed, so is the command. Other signals are sent to the command
+itself: the program writes its process id to a file, if it is given one.
 """
 
 import json
@@ -18,16 +19,20 @@ MOST_BYTES = 1 << 18
 """Size of a request, whose largest part is the environment [bytes]."""
 
 
-def command() -> list[str]:
-    """Return the words that start ``revolve``, before its arguments."""
+def command(teller: int | None = None) -> list[str]:
+    """Return the words that start ``revolve``, before its arguments.
+
+    ``teller``: open file to which the command's process id is written.
+    """
     if sys.platform != "linux":
         return [sys.executable, "-m", "revolve"]
     from tests import command_server  # not for the program, which imports little
 
-    return [sys.executable, "-IS", __file__, command_server.address()]
+    told = "" if teller is None else str(teller)
+    return [sys.executable, "-IS", __file__, command_server.address(), told]
 
 
-def _ask(address: str, words: list[str]) -> int:
+def _ask(address: str, teller: str, words: list[str]) -> int:
     """Let the server execute a command with the files of this process."""
     folder = os.getcwd()  # noqa: PTH109 - pathlib would be half of the start
     request = json.dumps([words, folder, dict(os.environ)])
@@ -35,6 +40,10 @@ def _ask(address: str, words: list[str]) -> int:
         server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, MOST_BYTES)
         server.connect(address)
         socket.send_fds(server, [request.encode()], [0, 1, 2])
+        process = server.recv(64)
+        if teller:
+            os.write(int(teller), process)
+            os.close(int(teller))
         code = int(server.recv(64))
     if code < 0:
         os.kill(os.getpid(), -code)
@@ -42,4 +51,4 @@ def _ask(address: str, words: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(_ask(sys.argv[1], sys.argv[2:]))
+    sys.exit(_ask(sys.argv[1], sys.argv[2], sys.argv[3:]))

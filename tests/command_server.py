@@ -110,6 +110,8 @@ class _Server:
             return True
         for file in files:
             os.close(file)
+        with suppress(ConnectionError):
+            client.send(str(process).encode())
         self._waiting.register(client, selectors.EVENT_READ, process)
         ended = os.pidfd_open(process)
         self._waiting.register(ended, selectors.EVENT_READ, (process, client))
@@ -154,7 +156,8 @@ class _Server:
         os.close(ended)
         if client.fileno() in self._waiting.get_map():
             self._waiting.unregister(client)
-            client.send(str(os.waitstatus_to_exitcode(status)).encode())
+            with suppress(ConnectionError):
+                client.send(str(os.waitstatus_to_exitcode(status)).encode())
         client.close()
 
 

@@ -40,7 +40,7 @@ STARTER = """
 import signal
 from tests.command import command
 
-print(command()[-1], flush=True)
+print(command()[-2], flush=True)
 signal.pause()
 """
 WORDS = ("plugins", "--plugins", "own.py")
@@ -101,7 +101,7 @@ def test_command_is_killed_with_whoever_started_its_server(tmp_path: Path) -> No
     )
     assert tests.stdout is not None
     socket = tests.stdout.readline().strip()
-    client, process = _waiting(tmp_path, [*command()[:-1], socket])
+    client, process = _waiting(tmp_path, [*command()[:-2], socket, ""])
     tests.kill()
     tests.communicate()
     assert client.wait() != 0

@@ -50,6 +50,34 @@ def address_of(run: Path) -> str:
     return file.read_text().split()[0]
 
 
+class Forked:
+    """Command of a forked process: signals are sent to it, all else is of its client.
+
+    Attributes:
+        pid: of the command.
+    """
+
+    def __init__(self, client: Process, pid: int) -> None:
+        self._client, self.pid = client, pid
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of the client
+        return getattr(self._client, name)
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal, unless the command has ended."""
+        if self._client.poll() is None:
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Send SIGTERM."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """Send SIGKILL."""
+        self.send_signal(signal.SIGKILL)
+
+
 class Workspace:
     """Starts the commands of a test in a folder and kills remaining processes.
 
@@ -70,13 +98,27 @@ class Workspace:
         inside: str = "",
         module: str = "revolve",
         log: Path | None = None,
+        is_new: bool = False,
     ) -> Process:
-        """Start ``revolve``, or another module, and return immediately."""
-        prefix = ("ip", "netns", "exec", inside) if inside else ()
-        command = (*prefix, sys.executable, "-m", module, *words)
-        return self.start_command(
-            *command, folder=folder, environment=environment, log=log
+        """Start ``revolve``, or another module, and return immediately.
+
+        It is a new interpreter if it has variables, another module or a network
+        namespace of its own, or ``is_new``; otherwise a fork.
+        """
+        is_new = is_new or bool(inside or environment or self.environment)
+        if is_new or module != "revolve" or sys.platform != "linux":
+            prefix = ("ip", "netns", "exec", inside) if inside else ()
+            new = (*prefix, sys.executable, "-m", module, *words)
+            return self.start_command(
+                *new, folder=folder, environment=environment, log=log
+            )
+        receiver, teller = os.pipe()
+        client = self.start_command(
+            *command(teller), *words, folder=folder, log=log, files=(teller,)
         )
+        os.close(teller)
+        with open(receiver) as told:  # noqa: PTH123 - an open file
+            return Forked(client, int(told.read()))
 
     def start_command(
         self,
@@ -84,8 +126,9 @@ class Workspace:
         folder: Path | None = None,
         environment: dict[str, str] | None = None,
         log: Path | None = None,
+        files: tuple[int, ...] = (),
     ) -> Process:
-        """Start any command, otherwise like ``start``."""
+        """Start any command, otherwise like ``start``; it keeps ``files`` open."""
         root = {"PYTHONPATH": str(Path(__file__).parents[2])}
         with ExitStack() as opened:
             file = opened.enter_context(log.open("w")) if log else subprocess.PIPE
@@ -96,6 +139,7 @@ class Workspace:
                 stderr=file,
                 text=True,
                 start_new_session=True,
+                pass_fds=files,
                 cwd=folder or self.folder,
                 env={**os.environ, **root, **self.environment, **(environment or {})},
             )
