@@ -6,7 +6,8 @@
 
 Rows are kept in docs/data/ecosystem, in files of one row per run, per run and minute,
 and per robot of the parts ``control`` and ``neutral``. Runs that have rows are skipped.
-A run takes about a minute of one core; two are made side by side.
+A run of few robots takes minutes of one core; one that stays at the limit of 60, which
+stand in piles, up to an hour. Two are made side by side.
 """
 
 import argparse
