@@ -153,6 +153,7 @@ def own_processes(deployment: Deployment, address: str) -> Iterator[list[Process
             )
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size, role=kind)
             pools.append(pool)
+        # Their server imports the code of all pools that exist when the first starts.
         for pool in pools:
             stack.enter_context(pool)
         # All at once before one is waited for: their grace times run together.

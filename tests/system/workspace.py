@@ -98,15 +98,14 @@ class Workspace:
         inside: str = "",
         module: str = "revolve",
         log: Path | None = None,
-        is_new: bool = False,
     ) -> Process:
         """Start ``revolve``, or another module, and return immediately.
 
-        It is a new interpreter if it has variables, another module or a network
-        namespace of its own, or ``is_new``; otherwise a fork.
+        It is a new interpreter if it is another module, or has variables or a network
+        namespace of its own; otherwise a fork.
         """
-        is_new = is_new or bool(inside or environment or self.environment)
-        if is_new or module != "revolve" or sys.platform != "linux":
+        is_own = inside or environment or self.environment
+        if is_own or module != "revolve" or sys.platform != "linux":
             prefix = ("ip", "netns", "exec", inside) if inside else ()
             new = (*prefix, sys.executable, "-m", module, *words)
             return self.start_command(
@@ -148,9 +147,7 @@ class Workspace:
 
     def run(self, *words: str, code: int = 0) -> str:
         """Run ``revolve`` to its end; return standard output and standard error."""
-        if self.environment:
-            return self.python("-m", "revolve", *words, code=code)
-        return self._finish(*command(), *words, code=code)
+        return self._finish(self.start(*words), code)
 
     def finished(self, document: str, births: int, name: str) -> Path:
         """Run a document to its end, in one process; return the run's folder."""
@@ -161,12 +158,12 @@ class Workspace:
 
     def python(self, *words: str, code: int = 0) -> str:
         """Run Python with arguments to its end; return all that it writes."""
-        return self._finish(sys.executable, *words, code=code)
+        return self._finish(self.start_command(sys.executable, *words), code)
 
-    def _finish(self, *words: str, code: int) -> str:
-        process = self.start_command(*words)
+    def _finish(self, process: Process, code: int) -> str:
         out, err = process.communicate(timeout=PATIENCE_S)
-        assert process.returncode == code, f"{words}: {process.returncode}\n{out}{err}"
+        failure = f"{process.args}: {process.returncode}\n{out}{err}"
+        assert process.returncode == code, failure
         told: str = out + err
         return told
 
