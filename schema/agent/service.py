@@ -57,12 +57,12 @@ UNSUPERVISED = ProcessSlot()
 
 _ENGINE_LOG = (
     "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error,"
-    "zenoh::net::routing::dispatcher::queries=error"
+    "zenoh::net::routing::dispatcher::queries=error,zenoh::api::session=error"
 )
 """Levels of Zenoh's log.
 
 The commands themselves tell of a hub that is missing. Queries whose time is over are
-normal: the job is sent again.
+normal, and so are replies to them: the job is sent again.
 """
 
 

@@ -76,3 +76,20 @@ def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
     assert one == "refused by a coordinator of version 1?: this is 2"
     assert other.startswith("refused by a coordinator of version ")
     assert len(other) < 300
+
+
+def test_a_reply_after_the_time_of_its_query_is_not_told(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The job is sent again, so that a slow machine is no reason for a warning."""
+    late: list[zenoh.Query] = []
+    with service.open_session(
+        zenoh.Config.from_json5(hub_config((new_socket(),)))
+    ) as session:
+        session.declare_queryable("slow", late.append)
+        found = [each.ok for each in session.get("slow", timeout=0.1)]
+        assert found == [None]
+        wait_until(lambda: bool(late), "the query arrives")
+        with late.pop() as query:
+            query.reply("slow", b"late")
+    assert capfd.readouterr() == ("", "")
