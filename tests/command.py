@@ -3,7 +3,7 @@
 A start takes 50 ms instead of half a second or, with figures, two seconds. Otherwise
 the command is one of a new interpreter: a process that leads a session of its own. It
 has the folder, environment and open files of the process that starts it. Its agents are
-those of any command. On systems other than Linux it is a new interpreter.
+forks of a fork of it. On systems other than Linux it is a new interpreter.
 
 As a program, this file sends its files to the server, waits for the command, and exits
 with its code. If it is killed, so is the command. Other signals are sent to the command

@@ -17,9 +17,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
+from multiprocessing import forkserver, resource_tracker, util
 from pathlib import Path
+from unittest.mock import patch
 
 from schema.agent.import_path import GRAPHICS, NO_GRAPHICS
 from schema.agent.supervisor import prepare_process
@@ -30,6 +33,8 @@ _OF_ARROW = "jemalloc_bg_thd"
 """Thread of Arrow's allocator, which starts again in a fork."""
 _DRAWING = ("analyze", "robot")
 """Commands that choose a library of graphics before they import MuJoCo."""
+_WITH_AGENTS = ("run", "resume", "worker", "analyzer", "suite")
+"""Commands that may start agents."""
 ADDRESS = "REVOLVE_COMMAND_SERVER"
 """Environment variable: socket of the server of the process that started this one."""
 
@@ -66,6 +71,35 @@ def _import_all() -> None:
         for module in pkgutil.walk_packages(room.__path__, f"{room.__name__}."):
             if module.name != "revolve.__main__" and "viewer" not in module.name:
                 importlib.import_module(module.name)
+
+
+def _fork(_path: object, words: Sequence[str], files: Sequence[int]) -> int:
+    """Fork a process that executes the code of a new interpreter; return its id.
+
+    It has standard files and ``files`` alone.
+    """
+    process = os.fork()
+    if process:
+        return process
+    try:
+        for file in map(int, os.listdir("/proc/self/fd")):  # noqa: PTH208 - open
+            if file not in {0, 1, 2, *files}:
+                with suppress(OSError):
+                    os.close(file)
+        exec(words[-1], {})  # noqa: S102 - what Python's interpreter would execute
+    finally:
+        os._exit(0)
+
+
+def _serve_agents() -> None:
+    """Start multiprocessing's server of agents for this command, as a fork of it.
+
+    It has all modules, and no session of the network, which comes later.
+    """
+    resource_tracker.ensure_running()
+    forkserver.set_forkserver_preload([])
+    with patch.object(util, "spawnv_passfds", _fork):
+        forkserver.ensure_running()
 
 
 class _Server:
@@ -139,6 +173,8 @@ class _Server:
             importlib.reload(sys.modules["mujoco.rendering.classic.gl_context"])
         sys.argv[1:] = words
         sys.path[0] = folder
+        if words[0] in _WITH_AGENTS:
+            _serve_agents()
 
     @staticmethod
     def _kill(client: selectors.SelectorKey) -> None:
