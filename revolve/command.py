@@ -12,6 +12,11 @@ from types import ModuleType
 from revolve.cli.commands import COMMANDS, actions
 from revolve.strangers import stranger
 
+_TOLD = {
+    errno.EMFILE: "too many open files: raise the limit (ulimit -n)",
+    errno.ENAMETOOLONG: "{}: the name is longer than the system allows",
+}
+"""What a user is told of a file for some errors of the system, by their number."""
 _UNDECODED = (
     "a name of a file or folder must be text in this locale's encoding, "
     f"{sys.getfilesystemencoding()}: rename it, or set PYTHONUTF8=1"
@@ -113,9 +118,10 @@ def _run_command(words: list[str], tell: Callable[[Exception], None]) -> int:
         tell(error)
         return 2
     except OSError as error:
-        if error.errno != errno.EMFILE:
+        if error.errno not in _TOLD:
             raise
-        tell(error_type("too many open files: raise the limit (ulimit -n)"))
+        file = import_module("schema.errors").cut(str(error.filename))
+        tell(error_type(_TOLD[error.errno].format(file)))
         return 2
     except UnicodeEncodeError as error:
         if "surrogates" not in error.reason:

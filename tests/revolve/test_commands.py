@@ -145,6 +145,15 @@ def test_a_run_shows_at_once_on_a_terminal_that_it_starts(
     assert not any("starting" in lines[key] for key in lines if key != (True,))
 
 
+@pytest.mark.parametrize("words", [["status"], ["robot", "show"], ["run"], ["log"]])
+def test_a_name_that_is_too_long_is_told_in_a_line(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*words, "x" * 300]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.search(r"revolve: x+\.\.\.: the name is longer than the system", line)
+
+
 def test_a_process_with_too_few_files_says_so(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
