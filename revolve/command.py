@@ -16,7 +16,7 @@ _TOLD = {
     errno.EMFILE: "too many open files: raise the limit (ulimit -n)",
     errno.ENAMETOOLONG: "{}: the name is longer than the system allows",
 }
-"""What a user is told of a file for some errors of the system, by their number."""
+"""Messages for errors of the operating system, by error number; {} is the file."""
 _UNDECODED = (
     "a name of a file or folder must be text in this locale's encoding, "
     f"{sys.getfilesystemencoding()}: rename it, or set PYTHONUTF8=1"

@@ -151,7 +151,7 @@ def test_forks_end_with_their_server_and_no_job_is_blamed(tmp_path: Path) -> Non
         os.kill(server, signal.SIGKILL)
         until(process_pool, lambda: len(known()) == 4)
         assert {one.read_text().split()[1] for one in known()} == {"0"}
-        # Those that nobody has waited for are still listed, but without a command line.
+        # The command line of a process that has ended is empty until it is waited for.
         lines = [Path("/proc", one.name, "cmdline") for one in first]
         assert not any(line.exists() and line.read_bytes() for line in lines)
 
