@@ -7,9 +7,13 @@ a line of JSON and ends when a check takes too long.
 
 import faulthandler
 import json
+import math
 import re
+import resource
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from itertools import chain
@@ -54,14 +58,18 @@ from schema.plugins.permission import FLAG, allow, allow_references, allowed, is
 from schema.tables.description import allow_plugins_of
 
 LIMIT_S = 30.0
-"""Time for the import, and for the check, of one plug-in [s]."""
+"""CPU time for the import, and for the check, of one plug-in [s]."""
+_WAITED = 4.0
+"""Limit of the time on the clock, in limits of CPU time: a machine may be busy."""
 HERE = "--here"
 """Flag of ``revolve check`` in the process that does the checks, with their limit."""
 BIRTHS = "--births"
 FROM = "--from"
 """Flags of the same process, as of ``revolve run``."""
 # What ``faulthandler`` writes for each thread when time is up; the main one is last.
-_LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
+_LATE = re.compile(
+    r'^(?:Current t|T)hread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE
+)
 
 _PLACE = re.compile(r"\.py:\d")
 
@@ -155,7 +163,7 @@ def check_apart(
     """Check plug-ins in a process of their own; return a line for each faulty one.
 
     ``tell`` gets a line for each plug-in in order, ``warn`` one for each warning; an
-    import, and a check, may each take ``limit_s`` [s].
+    import, and a check, may each take ``limit_s`` of CPU time [s].
     """
     flags = [HERE, str(limit_s)]
     for entry in allowed():
@@ -183,7 +191,8 @@ def check_apart(
     if threads := _LATE.findall(child.stderr):
         file, line = threads[-1]
         place = f"{Path(file).name}:{line}"
-        why = f"must take at most {limit_s:g} s, but was still at {place}"
+        most = f"{limit_s:g} s of CPU time, and {_WAITED * limit_s:g} s in all"
+        why = f"must take at most {most}, but was still at {place}"
     elif begun:
         why = f"must not end its process, but did, with status {child.returncode}"
     else:
@@ -294,11 +303,16 @@ def _placing(word: str, use: Use) -> Iterator[None]:
 @contextmanager
 def _time_limit(limit_s: float) -> Iterator[None]:
     """End this process if the block takes too long."""
-    # By a thread that needs no interpreter: a plug-in may be in foreign code.
-    faulthandler.dump_traceback_later(limit_s, exit=True)
+    # Neither needs the interpreter: a plug-in may be in foreign code.
+    faulthandler.dump_traceback_later(_WAITED * limit_s, exit=True)
+    faulthandler.register(signal.SIGXCPU, chain=True)
+    before, most = resource.getrlimit(resource.RLIMIT_CPU)
+    end_s = math.ceil(time.process_time() + limit_s)
+    resource.setrlimit(resource.RLIMIT_CPU, (end_s, most))
     try:
         yield
     finally:
+        resource.setrlimit(resource.RLIMIT_CPU, (before, most))
         faulthandler.cancel_dump_traceback_later()
 
 

@@ -128,7 +128,7 @@ EXPECTED = {
     "finite": "finite|different whole numbers",
     "repeatable": "the same|must be equal",
     "exit": r"SystemExit: 3( \(.*py:\d+\))?$",
-    "slow": "must take at most 1 s, but was still at",
+    "slow": "must take at most 0.5 s of CPU time, and 2 s in all, but was still at",
     "os._exit": "must not end its process, but did, with status 3$",
 }
 APART = ("slow", "os._exit")
@@ -198,7 +198,7 @@ def test_each_end_of_a_process_is_one_line(
     faulty: Writer, kind: str, fault: str
 ) -> None:
     document, file = faulty(kind, fault)
-    (line,) = check_apart([str(document)], limit_s=1.0 if fault == "slow" else 30.0)
+    (line,) = check_apart([str(document)], limit_s=0.5 if fault == "slow" else 30.0)
     _check_line(line, file, kind, fault)
 
 
