@@ -9,6 +9,9 @@ BIN := $(VENV)/bin
 NEEDED := $(VENV)/.installed-needed
 STAMP := $(VENV)/.installed
 DOCS_STAMP := $(VENV)/.docs-installed
+# pip has the settings of this machine, such as another package index.
+INSTALL ?= $(BIN)/python -m pip install --disable-pip-version-check --no-compile \
+	--progress-bar off
 # All of them write to one environment.
 .NOTPARALLEL:
 
@@ -140,8 +143,7 @@ $(NEEDED) $(STAMP) $(DOCS_STAMP): pyproject.toml constraints.txt
 		exit 1; }
 	@echo 'Installing what $(VENV) needs: about $(SIZE) on disk in all, a minute or two.'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@{ $(BIN)/python -m pip install --disable-pip-version-check --no-compile \
-		--progress-bar off -c constraints.txt -e '.[$(EXTRAS)]'; echo "ended $$?"; } \
+	@{ $(INSTALL) -c constraints.txt -e '.[$(EXTRAS)]'; echo "ended $$?"; } \
 		| awk 'BEGIN { printf "Downloading " } /Downloading|Using cached/ { printf "." } \
 			/^Installing/ { printf "\nInstalling ...\n" } { fflush() } \
 			END { if (!/^ended 0$$/) print ""; exit !/^ended 0$$/ }'
