@@ -137,9 +137,13 @@ class _Server:
         request, files, _, _ = socket.recv_fds(client, MOST_BYTES, 3)
         process = os.fork()
         if not process:
+            others = [key.fileobj for key in self._waiting.get_map().values()]
             self._waiting.close()
-            self._listener.close()
-            client.close()
+            for other in (*others, client):
+                if isinstance(other, socket.socket):
+                    other.close()
+                elif isinstance(other, int) and other > 0:
+                    os.close(other)  # of a process, not standard input
             self._become(files, *json.loads(request))
             return True
         for file in files:

@@ -3,6 +3,7 @@
 import logging
 import os
 import resource
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from itertools import count
@@ -15,6 +16,7 @@ from analysis.render.stage import choose_engine
 from schema.plugins import permission
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
+from tests import command_server
 from tests.own_brains import write_module
 
 # MuJoCo selects its rendering engine when it is first imported, by whichever test comes
@@ -31,6 +33,13 @@ if _SETTING is None:
 # when they are decorated.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
 settings.load_profile("fixed")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes(config: pytest.Config) -> None:
+    """Start one server of commands for all processes of a test session that uses it."""
+    if "not system" not in config.option.markexpr and sys.platform == "linux":
+        os.environ[command_server.ADDRESS] = command_server.address()
 
 
 _VARIABLES = dict(os.environ)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests.command import command
+from tests.command_server import ADDRESS
 from tests.system.workspace import wait_until
 
 pytestmark = [
@@ -93,9 +94,10 @@ def test_command_is_killed_with_its_client(tmp_path: Path) -> None:
 
 
 def test_command_is_killed_with_whoever_started_its_server(tmp_path: Path) -> None:
+    others = {name: text for name, text in os.environ.items() if name != ADDRESS}
     tests = subprocess.Popen(
         [sys.executable, "-c", STARTER],
-        env={**os.environ, "PYTHONPATH": str(TOP)},
+        env={**others, "PYTHONPATH": str(TOP)},
         stdout=subprocess.PIPE,
         text=True,
     )

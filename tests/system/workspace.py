@@ -18,6 +18,8 @@ from typing import Any
 from tests.command import command
 
 PATIENCE_S = 240.0
+_READ_LATE = ("REVOLVE_", "XDG_")
+"""Beginnings of variables that a command reads when it needs them."""
 Process = Any
 """A ``subprocess.Popen[str]``; mypy does not know that its pipes are there."""
 
@@ -101,10 +103,11 @@ class Workspace:
     ) -> Process:
         """Start ``revolve``, or another module, and return immediately.
 
-        It is a new interpreter if it is another module, or has variables or a network
-        namespace of its own; otherwise a fork.
+        It is a new interpreter if it is another module, or has a network namespace or
+        variables of its own that are read at its start; otherwise a fork.
         """
-        is_own = inside or environment or self.environment
+        own = {**self.environment, **(environment or {})}
+        is_own = inside or any(not name.startswith(_READ_LATE) for name in own)
         if is_own or module != "revolve" or sys.platform != "linux":
             prefix = ("ip", "netns", "exec", inside) if inside else ()
             new = (*prefix, sys.executable, "-m", module, *words)
@@ -113,8 +116,9 @@ class Workspace:
             )
         receiver, teller = os.pipe()
         client = self.start_command(
-            *command(teller), *words, folder=folder, log=log, files=(teller,)
-        )
+            *command(teller), *words,
+            folder=folder, environment=environment, log=log, files=(teller,),
+        )  # fmt: skip
         os.close(teller)
         with open(receiver) as told:  # noqa: PTH123 - an open file
             return Forked(client, int(told.read()))

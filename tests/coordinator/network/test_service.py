@@ -45,6 +45,7 @@ from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode, encode
 from schema.wire.messages import AgentInfo, Answer, Evaluate, Reply, Request
 from tests.system.fleet import introduce
+from tests.system.workspace import wait_until
 
 pytestmark = pytest.mark.system
 
@@ -204,9 +205,7 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
             for process, name in ((busy, "busy"), (it, "stuck")):
                 send(network, name, 0)
                 assert line_of(process) == "begun\n"
-            end_s = time.monotonic() + PATIENCE_S
-            while quiet_s("stuck") <= LONGEST_QUIET_S:
-                assert time.monotonic() < end_s
+            wait_until(lambda: quiet_s("stuck") > LONGEST_QUIET_S, "quiet", PATIENCE_S)
             assert 0.0 <= quiet_s("busy") <= LONGEST_QUIET_S
         network.ask("stuck")
         network.ask("nobody")

@@ -36,7 +36,7 @@ RECORDING = settings_of(record_touches=True)
 @pytest.mark.slow
 def test_thirty_robots_continue_after_a_snapshot(robot_of: Robots) -> None:
     """The snapshot is taken right after merges, with contacts."""
-    world, regrouped = counted(RECORDING, crowd(robot_of, 30, 0.8))
+    world, regrouped = counted(RECORDING, crowd(robot_of, 30, 1.0))
     taken: list[tuple[int, bytes]] = []
     merges = 0
     while len(taken) < 2:
