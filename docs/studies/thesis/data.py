@@ -86,6 +86,10 @@ PARTS = (
     ),
 )
 
+BRIDGES = tuple(
+    name for part in PARTS if part.option == "windows" for name in part.names
+)
+"""Experiments between off-line and on-line, which are no part of the thesis."""
 NAMES = [("experiment", pa.string()), ("run", pa.int32())]
 
 
@@ -96,6 +100,8 @@ WINDOWS = Path("windows") / "robots.csv"
 all start as in scenario 1."""
 SLOPE = "extremities_slope"
 """Outcome that is computed from the kept ``extremities``, at the end."""
+_FIRST_LATER = {"warm": 2, "drawn": 3, "reevaluated": 3}
+"""Number of the first window that begins after every window of selection, if not 1."""
 OF_WINDOWS = (*LATER, "kept_fitness")
 SELECTED = "window 0 to 12 s"
 LATER_COLUMNS = tuple(
@@ -290,13 +296,24 @@ def rows_of(data: Path, experiment: str) -> list[dict[str, str]]:
     return sorted(rows, key=lambda row: int(row["run"]))
 
 
+def selection_of(experiment: str) -> tuple[int | None, int]:
+    """Return the numbers of the window of selection, and of the first later one.
+
+    Drawn durations have no single window.
+    """
+    later = _FIRST_LATER.get(experiment.partition("-")[2], 1)
+    return (later - 1 if later < len(LATER_COLUMNS) - 1 else None), later
+
+
 def _of_windows(row: dict[str, str]) -> dict[str, float | None]:
     """Return the outcomes that follow from a row of ``WINDOWS``."""
 
     def value(key: str) -> float | None:
         return float(row[key]) if row[key] else None
 
-    first, later = value(SELECTED), list(map(value, LATER_COLUMNS))
+    every = list(map(value, (SELECTED, *LATER_COLUMNS)))
+    at, later = selection_of(row["experiment"])
+    first, selected = every[0], None if at is None else every[at]
     groups = ("time step", "friction", "start")
     shares = [
         [each / first for key in row if key.startswith(group)
@@ -305,7 +322,8 @@ def _of_windows(row: dict[str, str]) -> dict[str, float | None]:
         if first is not None and first > 0
     ]  # fmt: skip
     kept_fitness = fmean(map(fmean, shares)) if shares else None
-    values = later_fitness(later), sustained(first, later), kept_fitness
+    after = every[later:]
+    values = later_fitness(after), sustained(selected, after), kept_fitness
     return dict(zip(OF_WINDOWS, values, strict=True))
 
 

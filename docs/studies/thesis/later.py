@@ -21,10 +21,18 @@ from analysis.comparison.statistics import (
     rank_sum_p,
     runs_needed,
 )
-from analysis.figures.style import in_order, label, scales, theme_of_size
+from analysis.figures.style import in_order, label, ordered, scales, theme_of_size
 from analysis.measures.population_table import Numbers
 from docs.studies.pages import Parts, csv_rows, markdown
-from docs.studies.thesis.data import DATA, PARTS, WINDOWS, rows_of, windows
+from docs.studies.thesis.data import (
+    BRIDGES,
+    DATA,
+    PARTS,
+    WINDOWS,
+    rows_of,
+    selection_of,
+    windows,
+)
 from schema.robot.results import sustained
 
 Tables = Mapping[str, pa.Table]
@@ -34,6 +42,11 @@ DATES = DATA / "claims.csv"
 """Date at which each claim was committed with its rule."""
 WINDOW_S, LATE = 12, 3
 """Length of a window [s]; number of the first window that counts as late."""
+_SPANS = [f"{WINDOW_S * at} to {WINDOW_S * (at + 1)} s" for at in range(5)]
+_PANELS = {"warm": "warm-up of 12 s", "drawn": "drawn durations",
+           "reevaluated": "drawn durations, re-evaluated"}  # fmt: skip
+"""Titles of the experiments between off-line and on-line, by the end of their names."""
+_THESIS = "as in the thesis"
 _STAGES = {
     "2026-11-21": "no row; the margins were chosen on 2026-11-23",
     "2026-11-23": "23 repeats: 7 or 8 of each experiment but scenarios 2 (1) and 3 (0)",
@@ -71,35 +84,23 @@ def parts_of(tables: Tables) -> Parts:
 
 
 def _windows() -> list[str]:
-    """Return the median fitness in each window, and who comes out again."""
-    names = with_rows()
-    found = {name: windows(DATA, name) for name in names}
-    recorded = {
-        name: np.array([float(row["recorded"]) for row in rows_of(DATA, name)])
-        for name in names
-    }
-    heads = ["window", *(f"{label(name)} ({len(found[name])} runs)" for name in names)]
-    rows = [
-        [
-            f"{WINDOW_S * at} to {WINDOW_S * (at + 1)} s",
-            *(f"{np.median(found[name][:, at]):.3f}" for name in names),
-        ]
-        for at in range(5)
-    ]
-    shares = [
-        np.median([sustained(first, later) for first, *later in each if first > 0])
-        for each in (values.tolist() for values in found.values())
-    ]
-    rows.append(["sustained", *(f"{100 * share:.0f} %" for share in shares)])
-    again = [
-        int((np.abs(found[name][:, 0] - known) <= _CLOSE * known).sum())
-        for name, known in recorded.items()
-    ]
-    counts = [
-        "-" if name == ARENA else f"{count} of {len(values)}"
-        for count, (name, values) in zip(again, found.items(), strict=True)
-    ]
-    rows.append(["recorded fitness again (within 5 %)", *counts])
+    """Return the median fitness in each window, what lasts, and who comes out again."""
+    heads = ["experiment", "runs", *_SPANS, "sustained", "recorded fitness again"]
+    rows = []
+    for name in with_rows():
+        found = windows(DATA, name)
+        recorded = np.array([float(row["recorded"]) for row in rows_of(DATA, name)])
+        share = again = "-"
+        at, later = selection_of(name)
+        if at is not None:
+            shares = [sustained(each[at], each[later:])
+                      for each in found.tolist() if each[at] > 0]  # fmt: skip
+            share = f"{100 * np.median(np.array(shares, np.float64)):.0f} %"
+        if at is not None and name != ARENA:
+            is_again = np.abs(found[:, at] - recorded) <= _CLOSE * recorded
+            again = f"{is_again.sum()} of {len(found)}"
+        medians = (f"{value:.3f}" for value in np.median(found, axis=0))
+        rows.append([label(name), str(len(found)), *medians, share, again])
     return markdown(heads, rows)
 
 
@@ -110,7 +111,7 @@ def _late() -> list[str]:
     pairs = [("scenario3", "scenario1"), ("scenario3", "scenario2"),
              ("scenario3", "no-reproduction"), ("scenario1", "no-reproduction"),
              ("scenario2", "no-reproduction"), ("scenario1", "scenario2")]  # fmt: skip
-    new = [name for name in names if name in _bridges()]
+    new = [name for name in names if name in BRIDGES]
     pairs += [(name, other) for name, other in product(new, ("scenario3",))]
     pairs += [(name, name.partition("-")[0]) for name in new]
     rows = []
@@ -134,7 +135,7 @@ def bridges() -> list[str]:
     """Return whether experiments close the gap to scenario 3, for docs/starts.md."""
     rows, known = [], with_rows()
     arenas = late_fitness(ARENA)
-    for name in ("scenario1", "scenario2", *_bridges()):
+    for name in ("scenario1", "scenario2", *BRIDGES):
         if name not in known:
             rows.append([f"`{name}`", "0", "not measured yet", "", ""])
             continue
@@ -156,26 +157,24 @@ def bridges() -> list[str]:
     return markdown(heads, rows)
 
 
-def _bridges() -> list[str]:
-    return [name for part in PARTS if part.option == "windows" for name in part.names]
-
-
 def _kept(tables: Tables) -> list[str]:
     """Return what best robots keep and sustain, means over runs."""
     outcomes = tables["outcomes"].to_pandas()
     texts = {"sustained": "sustained in later windows",
              "kept_fitness": "kept under changes of time step, friction and start",
              "later_fitness": "fitness in later windows [m/s]"}  # fmt: skip
-    names = with_rows()
     rows = []
-    for measure, text in texts.items():
+    for name in with_rows():
+        mine = outcomes[outcomes["experiment"] == name]
         cells = []
-        for name in names:
-            values = outcomes[outcomes["experiment"] == name][measure].dropna()
+        for measure in texts:
+            values = mine[measure].dropna()
             low, middle, high = values.quantile([0.25, 0.5, 0.75])
-            cells.append(f"{middle:.3f} ({low:.3f}, {high:.3f})")
-        rows.append([text, *cells])
-    return markdown(["median (quartiles) of best robots", *map(label, names)], rows)
+            cells.append(
+                f"{middle:.3f} ({low:.3f}, {high:.3f})" if len(values) else "-"
+            )
+        rows.append([label(name), *cells])
+    return markdown(["median (quartiles) of best robots", *texts.values()], rows)
 
 
 def key_of(row: Mapping[str, Any]) -> tuple[str, ...]:
@@ -261,30 +260,37 @@ def topics(rows: Sequence[Row]) -> str:
 def windows_figure(tables: Tables) -> p9.ggplot:
     """Return median fitness and quartiles of best robots over windows."""
     frame = tables["windows"].to_pandas()
-    grouped = frame.groupby(["experiment", "window"])["fitness"]
+    grouped = frame.groupby(["panel", "experiment", "window"])["fitness"]
     shown = grouped.quantile([0.25, 0.5, 0.75]).unstack()
     shown = shown.set_axis(["low", "middle", "high"], axis=1).reset_index()
-    names = in_order(shown["experiment"])
+    panels = frame["panel"].unique().tolist()
+    shown["panel"] = ordered(shown["panel"], panels)
     labels = [f"{WINDOW_S * n}-{WINDOW_S * (n + 1)}" for n in range(5)]
     return (
         p9.ggplot(shown, p9.aes("window", "middle"))
         + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.15)
         + p9.geom_line(p9.aes(colour="experiment"), size=0.9)
         + p9.geom_point(p9.aes(colour="experiment"), size=1.8)
-        + scales(tables, names)
+        + p9.facet_wrap("panel", ncol=2)
+        + scales(tables, shown["experiment"])
         + p9.scale_x_continuous(breaks=list(range(5)), labels=labels)
         + p9.expand_limits(y=0)
         + p9.labs(x="window [s]", y="fitness of the best robot [m/s]")
-        + theme_of_size(3.6)
+        + theme_of_size(1.5 + 2.4 * -(-len(panels) // 2))
     )
 
 
 def rows_of_windows(data: Path = DATA) -> pa.Table:
-    """Return one row per best robot and window, which the figure shows."""
+    """Return one row per best robot and window in each panel of the figure."""
+    names = [name for name in with_rows(data) if name != TOUCHES]
+    shown = [(_THESIS, name, name) for name in names if name not in BRIDGES]
+    for kind, title in _PANELS.items():
+        own = [name for name in BRIDGES if name in names and name.endswith(kind)]
+        shown += [(title, name, name.partition("-")[0]) for name in own]
+        shown += [(title, ARENA, ARENA)] * bool(own)
     rows = [
-        {"experiment": name, "window": at, "fitness": value}
-        for name in with_rows(data)
-        if name != TOUCHES
+        {"panel": panel, "experiment": base, "window": at, "fitness": value}
+        for panel, name, base in shown
         for values in windows(data, name)
         for at, value in enumerate(values.tolist())
     ]

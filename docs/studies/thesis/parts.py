@@ -12,7 +12,7 @@ from analysis.comparison.findings import LARGE, SURE
 from analysis.comparison.statistics import ALPHA, alike_power
 from analysis.figures.style import in_order, label, pair_name
 from docs.studies.pages import Parts, markdown
-from docs.studies.thesis.data import PARTS
+from docs.studies.thesis.data import BRIDGES, PARTS
 from docs.studies.thesis.later import bridges, parts_of, topics
 
 Tables = Mapping[str, pa.Table]
@@ -110,8 +110,8 @@ def _runs(tables: Tables) -> list[str]:
 
 
 def _last(tables: Tables) -> dict[str, pa.Table]:
-    """Return the outcomes of each experiment at the end."""
-    outcomes = tables["outcomes"]
+    """Return the outcomes at the end of each experiment of the thesis."""
+    outcomes = tables["outcomes"].filter(~pc.field("experiment").isin(BRIDGES))
     found = {}
     for name in in_order(outcomes["experiment"].to_pylist()):
         mine = outcomes.filter(pc.field("experiment") == name)

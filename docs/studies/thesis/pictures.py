@@ -22,6 +22,7 @@ from analysis.figures.findings import effects
 from analysis.figures.style import in_order
 from analysis.render.stage import choose_engine
 from docs.studies.pages import PICTURES
+from docs.studies.thesis.data import BRIDGES
 from docs.studies.thesis.later import windows_figure
 
 Tables = Mapping[str, pa.Table]
@@ -64,8 +65,8 @@ def _sources(tables: Tables) -> dict[str, pa.Table]:
 
 
 def _whole(rows: pa.Table) -> pa.Table:
-    """Return the rows without those of the short runs that record touches."""
-    return rows.filter(pc.field("experiment") != TOUCHES)
+    """Return the rows of experiments of the thesis and of whole runs."""
+    return rows.filter(~pc.field("experiment").isin([TOUCHES, *BRIDGES]))
 
 
 def _families(tables: Tables) -> dict[str, pa.Table]:
