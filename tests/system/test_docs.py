@@ -47,11 +47,11 @@ def _follow(workspace: Workspace, lines: Iterable[str]) -> list[str]:
     ]
 
 
-def _short(document: str) -> str:
-    """Return an experiment with evaluations of four seconds, unless it has its own."""
+def _short(document: str, length_s: int = 1) -> str:
+    """Return an experiment with evaluations of a length, unless it has its own."""
     if "[simulation]" in document:
         return document
-    return f"{document}\n[simulation]\nwindow_steps = 800\n"
+    return f"{document}\n[simulation]\nwindow_steps = {200 * length_s}\n"
 
 
 def _quoted(page: Path, start: str) -> str:
@@ -199,7 +199,8 @@ def test_experiments_of_the_experiments_page_run(workspace: Workspace) -> None:
     documents = blocks_of(page, "toml")
     assert len(documents) >= 3
     for document in documents:
-        _write(workspace, {"mine.toml": _short(document)})
+        # One pushes robots every three seconds.
+        _write(workspace, {"mine.toml": _short(document, 4)})
         words = f"--births 20 --in-process --quiet --out out-{len(document)}"
         _follow(workspace, [f"revolve run mine.toml {words}"])
         if "my_parts" not in document:

@@ -26,8 +26,8 @@ Pair = tuple[int, int]
 @pytest.mark.parametrize(
     ("document", "before", "births"),
     [
-        pytest.param(POND, 30, 45, id="ecosystem"),
-        pytest.param(PONDS, 30, 40, id="ring of two"),
+        pytest.param(POND, 18, 28, id="ecosystem"),
+        pytest.param(PONDS, 22, 30, id="ring of two"),
         pytest.param((EXAMPLES / "predators.toml").read_text(), 20, 40, id="predators"),
     ],
 )
