@@ -43,7 +43,9 @@ def main(arguments: list[str]) -> int:
         why = error.strerror or error
         raise RunFolderError(f"{options.out}: cannot be written: {why}") from None
     size = "" if isinstance(content, str) else f"{counted(len(content), 'row')} of "
-    print(f"{options.out}: {size}{counted(len(runs), 'run')}")
+    full = [] if content else [name for name in TABLES if len(runs.table(name))]
+    hint = f"; tables with rows: {', '.join(full)}" if full else ""
+    print(f"{options.out}: {size}{counted(len(runs), 'run')}{hint}")
     return 0
 
 

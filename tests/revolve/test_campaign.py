@@ -167,6 +167,17 @@ def test_other_formats_hold_the_tables(
     assert capsys.readouterr().out == f"{file}: {runs.births.num_rows} rows of 6 runs\n"
 
 
+def test_export_of_an_empty_table_names_those_with_rows(
+    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "file"
+    export(campaign, "--table", "drifts", "--to", "csv", "--out", file)
+    told, _, full = capsys.readouterr().out.strip().partition("; tables with rows: ")
+    assert told == f"{file}: 0 rows of 6 runs"
+    runs = rv.Runs(campaign)
+    assert full.split(", ") == [each for each in TABLES if runs.table(each).num_rows]
+
+
 @pytest.mark.system
 def test_latex_is_the_comparison_of_the_report(campaign: Path, tmp_path: Path) -> None:
     rv.Runs(campaign).export(tmp_path / "a.tex", to="latex")
