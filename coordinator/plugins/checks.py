@@ -305,6 +305,7 @@ def _time_limit(limit_s: float) -> Iterator[None]:
     """End this process if the block takes too long."""
     # Neither needs the interpreter: a plug-in may be in foreign code.
     faulthandler.dump_traceback_later(_WAITED * limit_s, exit=True)
+    signal.signal(signal.SIGXCPU, signal.SIG_DFL)
     faulthandler.register(signal.SIGXCPU, chain=True)
     before, most = resource.getrlimit(resource.RLIMIT_CPU)
     end_s = math.ceil(time.process_time() + limit_s)
@@ -313,6 +314,7 @@ def _time_limit(limit_s: float) -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_CPU, (before, most))
+        faulthandler.unregister(signal.SIGXCPU)
         faulthandler.cancel_dump_traceback_later()
 
 
