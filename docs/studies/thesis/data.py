@@ -100,8 +100,9 @@ WINDOWS = Path("windows") / "robots.csv"
 all start as in scenario 1."""
 SLOPE = "extremities_slope"
 """Outcome that is computed from the kept ``extremities``, at the end."""
-_FIRST_LATER = {"warm": 2, "drawn": 3, "reevaluated": 3}
-"""Number of the first window that begins after every window of selection, if not 1."""
+_SELECTION = {"warm": (1, 2), "drawn": (None, 3), "reevaluated": (None, 3)}
+"""Numbers of the window of selection, and of the first one after it, if not 0 and 1;
+drawn durations have no single window."""
 OF_WINDOWS = (*LATER, "kept_fitness")
 SELECTED = "window 0 to 12 s"
 LATER_COLUMNS = tuple(
@@ -297,12 +298,8 @@ def rows_of(data: Path, experiment: str) -> list[dict[str, str]]:
 
 
 def selection_of(experiment: str) -> tuple[int | None, int]:
-    """Return the numbers of the window of selection, and of the first later one.
-
-    Drawn durations have no single window.
-    """
-    later = _FIRST_LATER.get(experiment.partition("-")[2], 1)
-    return (later - 1 if later < len(LATER_COLUMNS) - 1 else None), later
+    """Return the numbers of the window of selection, and of the first after it."""
+    return _SELECTION.get(experiment.partition("-")[2], (0, 1))
 
 
 def _of_windows(row: dict[str, str]) -> dict[str, float | None]:
