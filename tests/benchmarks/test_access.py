@@ -22,7 +22,7 @@ from tests.system.workspace import free_address
 
 prepare_process()  # as the command does, before the first session is opened
 
-pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.benchmark
 
 LEAST_RATIO = 0.95
 PAIRS = 20

@@ -49,7 +49,6 @@ def _write_experiment(root: Path, experiment: str) -> None:
         write_run(folder, experiment, number, BIRTHS_EACH, bodies)
 
 
-@pytest.mark.timeout(900)
 def test_all_measures_of_a_campaign(tmp_path: Path) -> None:
     runs = tmp_path / "runs"
     with ProcessPoolExecutor(2, get_context("spawn")) as pool:

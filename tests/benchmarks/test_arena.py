@@ -112,7 +112,6 @@ def report(name: str, found: ArenaTiming) -> None:
 
 @pytest.mark.benchmark
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("name", "least", "most"),
     [("evolved", 0.84, 0.07), ("random", 0.82, 0.04), ("crowded", 0.88, 0.05)],
@@ -136,7 +135,6 @@ def test_steps_are_most_of_the_time_of_thirty_robots(
 
 @pytest.mark.benchmark
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_time_per_robot_is_nearly_constant_at_constant_density() -> None:
     """Alternate two sizes, each relative to its own solo steps."""
     growths = []
@@ -150,7 +148,6 @@ def test_time_per_robot_is_nearly_constant_at_constant_density() -> None:
 
 @pytest.mark.benchmark
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="needs two cores")
 def test_two_threads_spend_at_least_0_6_of_the_time_on_solo_steps() -> None:
     """Targets of the printed factors: 30 robots: 10 and 18; 200: 3; 400: 1.

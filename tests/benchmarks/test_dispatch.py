@@ -49,7 +49,7 @@ from tests.coordinator.run.test_scheduler import plan, scheduler_of
 prepare_process()
 skip_pandas()
 
-pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.benchmark
 
 UTILISATION = 0.95
 RUNS = 8

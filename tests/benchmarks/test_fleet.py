@@ -14,7 +14,7 @@ import pytest
 
 import revolve as rv
 
-pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.benchmark
 
 T = TypeVar("T")
 

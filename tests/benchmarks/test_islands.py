@@ -9,7 +9,7 @@ from schema.experiment.document import Experiment, Islands, SelectionSection
 from schema.experiment.migration import Migration
 from tests.coordinator.archipelago_run import ArchipelagoRun
 
-pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.benchmark
 
 ISLANDS = 8
 BROODS = 60

@@ -30,7 +30,7 @@ from schema.wire.updates import Birth, Update
 from worker.arena.replay import alone
 from worker.bench.spider import spider
 
-pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
+pytestmark = pytest.mark.benchmark
 
 ROBOTS, HERTZ, ADVANCE_S = 30, 5, 5
 MINUTES = 3

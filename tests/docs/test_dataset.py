@@ -13,7 +13,7 @@ from docs.studies.dataset import FILES, write
 from docs.studies.thesis.data import DATA
 from revolve.command import main
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 REPEATS = ("scenario1-00", "scenario3-07")
 MINE = """

@@ -34,7 +34,6 @@ def _run(page: Path, folder: Path, *numbers: str) -> None:
     assert int(done.stdout.split()[-2]) >= 2
 
 
-@pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("name", "births"),
     [("04-part", "150=20"), ("07-tables", "60=20"), ("10-rules", "60=25")],
@@ -84,7 +83,6 @@ def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
     _run(DOCS / page, tmp_path)
 
 
-@pytest.mark.timeout(900)
 def test_ppo_of_the_simulation_page_trains(tmp_path: Path) -> None:
     pytest.importorskip("stable_baselines3", reason="a library of gigabytes")
     (block,) = blocks_of(DOCS / "simulation.md", "py")

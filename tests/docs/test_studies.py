@@ -75,7 +75,7 @@ cull_interval_s = 4.0
 sample_interval_s = 1.0
 """
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 
 @pytest.mark.parametrize("study", STUDIES)

@@ -18,7 +18,7 @@ from analysis.measures.outputs import OUTPUTS, schema
 from schema.tables.description import description_text, read_description
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,7 @@ from schema.wire.codec import decode
 from schema.wire.poses import PoseArrays
 from tests.system.workspace import Workspace, address_of, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 CRITTERS = Path(__file__).parents[1] / "plugins" / "critters_lab" / "critters"
 PISTONS = """

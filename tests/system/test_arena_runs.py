@@ -17,7 +17,7 @@ from tests.system.documents import OFF_LINE, SMALL_ARENA
 from tests.system.fleet import Fleet, holders, kill_beyond, size
 from tests.system.workspace import Workspace, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.system
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 WORDS = ("crowd.toml", "--seed", "4", "--quiet")

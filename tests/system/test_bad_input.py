@@ -16,7 +16,7 @@ from tests.system.documents import HAMLET, SCENARIO1
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 
 def test_certificates_of_the_environment_are_not_those_of_a_run_in_one_process(

@@ -12,7 +12,7 @@ from schema.tables.description import RunDetails, read_state
 from tests.system.conftest import Once
 from tests.system.workspace import Workspace, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 SHORT = """
 name = "{name}"

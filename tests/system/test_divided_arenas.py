@@ -13,7 +13,7 @@ from coordinator.storage.compare import compare
 from tests.system.fleet import Fleet, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.system
 
 WORDS = ("crowd.toml", "--seed", "4", "--quiet", "--arena-workers", "4")
 

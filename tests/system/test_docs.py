@@ -22,7 +22,7 @@ from tests.system.workspace import Workspace, wait_until
 from worker.kinds import check_fitness
 from worker.measures import BUILT_IN, measures_of
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 TOP = Path(__file__).parents[2]
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
@@ -161,7 +161,6 @@ def test_rule_of_the_selection_page_remembers_per_island_and_run(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_measures_page_runs_from_top_to_bottom(workspace: Workspace) -> None:
     page = TOP / "docs" / "measures.md"
     module, *readers = blocks_of(page, "python")

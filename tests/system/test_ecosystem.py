@@ -16,7 +16,7 @@ from tests.system.documents import POND, POND_RULES, PONDS
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 ALONE = ("--in-process", "--quiet")

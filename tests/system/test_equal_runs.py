@@ -18,7 +18,7 @@ from tests.system.documents import SCENARIO1
 from tests.system.fleet import Fleet, kill_beyond, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 NOISY = """name = "noisy"
 [simulation]

@@ -19,7 +19,6 @@ from tests.system.workspace import Workspace, wait_until
 
 pytestmark = [
     pytest.mark.system,
-    pytest.mark.timeout(300),
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 

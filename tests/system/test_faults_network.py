@@ -23,7 +23,6 @@ from tests.system.workspace import Workspace, wait_until
 pytestmark = [
     pytest.mark.system,
     pytest.mark.slow,
-    pytest.mark.timeout(600),
     NEEDS_ROOT,
 ]
 

@@ -16,7 +16,6 @@ from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
 pytestmark = [
     pytest.mark.system,
-    pytest.mark.timeout(300),
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 

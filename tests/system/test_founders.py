@@ -21,7 +21,7 @@ from tests.system.documents import MIXED
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 GIVEN = """
 [founders]

@@ -19,7 +19,7 @@ from tests.system.documents import RING
 from tests.system.fleet import kill_beyond, size
 from tests.system.workspace import Process, Workspace, free_address, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.system
 
 GROUPS = ("group-0", "group-1")
 

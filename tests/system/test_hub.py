@@ -22,7 +22,7 @@ from tests.system.workspace import (
     wait_until,
 )
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 PLAIN = ("coordinator", *SCENARIO1)
 ARENA = ("coordinator", *HAMLET)
@@ -69,7 +69,6 @@ def told_of_hub(process: Running) -> tuple[int, int]:
 
 @pytest.mark.long
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_coordinators_and_the_hub_come_and_go(
     site: Site, undisturbed: Path, small_arena_run: Path
 ) -> None:

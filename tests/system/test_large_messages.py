@@ -23,7 +23,7 @@ from tests.system.workspace import (
     wait_until,
 )
 
-pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.system, pytest.mark.slow]
 
 TIMES = 20
 LENGTHS = (1_000, 64_000, 1_000_000, 30_000_000)

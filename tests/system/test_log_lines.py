@@ -18,7 +18,7 @@ from tests.system.workspace import (
     wait_until,
 )
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 KEYS = {"time", "level", "process", "pid", "message"}
 

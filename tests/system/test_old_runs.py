@@ -15,7 +15,7 @@ from schema.tables.columns import TABLES
 from schema.tables.files import read_table
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data"

@@ -10,7 +10,7 @@ import pytest
 from tests.system.fleet import agent_processes
 from tests.system.workspace import PATIENCE_S, Workspace, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 CRAWLERS = Path(__file__).parents[1] / "plugins" / "crawlers.py"
 SPACE = """

@@ -21,7 +21,7 @@ from tests.system.documents import OFF_LINE, SMALL_ARENA
 from tests.system.fleet import Fleet, size
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+pytestmark = pytest.mark.system
 
 
 TOP = Path(__file__).parents[2]

@@ -13,7 +13,7 @@ from revolve.suite.score import Score
 from tests.system.tiny_suite import STEPS, tiny
 from tests.system.workspace import Workspace, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 MINE = f"""
 name = "mine"

@@ -25,7 +25,7 @@ from schema.tables.files import read_table
 from tests.system.fleet import Fleet
 from tests.system.workspace import Workspace, wait_until
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 
 WORDS = ("hamlet.toml", "--seed", "4", "--quiet")

@@ -21,7 +21,7 @@ from rerun.experimental import ViewerClient
 from schema.tables.files import read_table
 from tests.system.workspace import Workspace
 
-pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.system
 
 Floats = npt.NDArray[np.float64]
 

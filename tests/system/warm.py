@@ -28,7 +28,7 @@ import worker.serve.service  # noqa: E402, F401
 from coordinator.cli import main_loop  # noqa: E402
 from schema.errors import RevolveError  # noqa: E402
 
-PATIENCE_S = 240.0
+PATIENCE_S = 600.0
 _MAINS: dict[str, Callable[[list[str]], int]] = {
     "analyzer": analyzer.__main__.main,
     "worker": worker.__main__.main,

@@ -17,7 +17,7 @@ from typing import Any
 
 from tests.command import command
 
-PATIENCE_S = 240.0
+PATIENCE_S = 600.0
 _READ_LATE = ("REVOLVE_", "XDG_")
 """Beginnings of variables that a command reads when it needs them."""
 Process = Any

@@ -78,7 +78,6 @@ def content(rows: Floats, commands: list[Floats]) -> dict[str, Any]:
 
 
 @pytest.mark.long
-@pytest.mark.timeout(180)
 @pytest.mark.parametrize("width", [1280, 400])
 def test_a_browser_moves_robots_as_the_viewer_does(
     motion: tuple[Floats, list[Floats]], tmp_path: Path, width: int

@@ -7,7 +7,7 @@ import pytest
 from tests.analysis.browser import looked_at
 from tests.analysis.reported import drawings, page, tables
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(180)]
+pytestmark = pytest.mark.long
 
 WIDE, SCREEN = 1000, 720
 """Width from which on, and height at which the difference must be seen [pixels]."""

@@ -53,7 +53,6 @@ def live(
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(600)
 def test_no_contact_is_missed_in_long_runs(robot_of: Robots) -> None:
     """Over 5,000 pair-steps in contact and 100 merges."""
     pair_steps = merges = 0
