@@ -251,7 +251,8 @@ def test_a_job_without_a_reply_expires_after_its_wait(network: Network) -> None:
         (event,) = until(network, has(1))
         assert isinstance(event, Returned)
         assert (event.number, event.agent, event.outcome) == (0, "w", "expired")
-        assert event.took_s == pytest.approx(0.5, abs=0.4)
+        assert event.took_s is not None
+        assert 0.4 < event.took_s < PATIENCE_S
 
 
 def test_a_long_job_that_is_asked_for_again_is_done_once(
