@@ -17,6 +17,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import traceback
 from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
@@ -81,14 +82,19 @@ def _fork(_path: object, words: Sequence[str], files: Sequence[int]) -> int:
     process = os.fork()
     if process:
         return process
+    code = 1
     try:
         for file in map(int, os.listdir("/proc/self/fd")):  # noqa: PTH208 - open
             if file not in {0, 1, 2, *files}:
                 with suppress(OSError):
                     os.close(file)
-        exec(words[-1], {})  # noqa: S102 - what Python's interpreter would execute
+        with suppress(SystemExit):
+            exec(words[-1], {})  # noqa: S102 - what Python's interpreter would execute
+        code = 0
+    except BaseException:  # noqa: BLE001 - as the interpreter
+        traceback.print_exc()
     finally:
-        os._exit(0)
+        os._exit(code)
 
 
 def _serve_agents() -> None:
