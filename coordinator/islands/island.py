@@ -51,15 +51,7 @@ from schema.wire.messages import Bred, Breed, Evaluate
 
 @dataclass(slots=True)
 class _Birth:
-    """Birth in flight.
-
-    Attributes:
-        request: for its candidate, of the current couple.
-        couple: its parents; None for a robot without any.
-        candidate: that was bred; None until one is viable.
-        outcome: its evaluation; None until it has arrived.
-        learning: its trials; None without learning, and before it is viable.
-    """
+    """Birth in flight: request, parents, viable candidate, evaluation, trials."""
 
     request: Breed
     couple: Couple | None

@@ -10,10 +10,12 @@ told which jobs crashed the earlier ones.
 import contextlib
 import ctypes
 import math
+import multiprocessing.util
 import os
 import resource
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -123,6 +125,15 @@ def _modules(body: Callable[..., object]) -> set[str]:
     return set().union(*map(_modules, bound))
 
 
+def _keep_sockets_short() -> None:
+    """Put the server's socket into /tmp if its path would have more than 107 bytes."""
+    given = tempfile.gettempdir()
+    if len(os.fsencode(given)) > 107 - len("/pymp-XXXXXXXX/listener-XXXXXXXX"):
+        tempfile.tempdir = "/tmp"  # noqa: S108 - in a private folder
+        multiprocessing.util.get_temp_dir()
+        tempfile.tempdir = given
+
+
 def _exit_code(process: BaseProcess) -> int:
     """Return the exit code of a process that has ended, or whose server has.
 
@@ -142,13 +153,9 @@ def _exit_code(process: BaseProcess) -> int:
 
 @dataclass(slots=True)
 class _Place:
-    """A slot, its process if one is running, and when to start the next one.
+    """A slot and its process; None: the next one is to be started at ``due_s``.
 
-    Attributes:
-        process: the running one; None: it is to be started.
-        due_s: when the next one is to be started [s].
-        pause_s: of the next one that exits by itself [s].
-        code: exit code of the last one if it exited by itself.
+    ``pause_s`` and ``code`` are of processes that exit by themselves.
     """
 
     slot: ProcessSlot
@@ -174,6 +181,7 @@ class ProcessPool:
         self._arguments = arguments
         self._what = f"a{'n' * (role[0] in 'aeiou')} {role} process ended"
         _CODE.update(_modules(body))
+        _keep_sockets_short()
         _CONTEXT.set_forkserver_preload(sorted(_CODE))
         slots = (ProcessSlot(index, CurrentJob()) for index in range(size))
         self._places = [_Place(slot) for slot in slots]

@@ -88,3 +88,13 @@ def test_agents_end_with_their_standard_input_or_command(
         else:
             process.kill()
         assert all(isinstance(event, Left) for event in until(network, 2))
+
+
+def test_a_run_finishes_where_the_path_of_temporary_files_is_long(
+    workspace: Workspace,
+) -> None:
+    """That of a socket has 107 bytes at most."""
+    folder = workspace.folder / ("d" * 100)
+    folder.mkdir()
+    workspace.environment["TMPDIR"] = str(folder)
+    workspace.run("run", "scenario1", "--births", "17", "--workers", "1")
