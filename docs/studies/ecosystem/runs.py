@@ -1,13 +1,14 @@
 """Makes the runs of the study of the ecosystem, for docs/ecosystem.md.
 
-    python -m docs.studies.ecosystem.runs                 # start, or go on after an end
-    python -m docs.studies.ecosystem.runs --part control  # only a part
-    python -m docs.studies.ecosystem.runs --missing       # count the runs that lack
+    python -m docs.studies.ecosystem.runs FOLDER                 # start, or go on
+    python -m docs.studies.ecosystem.runs FOLDER --part control  # only a part
+    python -m docs.studies.ecosystem.runs --missing              # count those that lack
 
 Rows are kept in docs/data/ecosystem, in files of one row per run, per run and minute,
-and per robot of the parts ``control`` and ``neutral``. Runs that have rows are skipped.
-A run of few robots takes minutes of one core; one that stays at the limit of 60, which
-stand in piles, up to an hour. Two are made side by side.
+and per robot of the parts ``control`` and ``neutral``. Runs that have rows are skipped,
+and a run that was begun in the folder is resumed. A run of few robots takes minutes of
+one core; one that stays at the limit of 60, which stand in piles, up to an hour. Those
+that are expected to be short come first; two are made side by side.
 """
 
 import argparse
@@ -15,7 +16,6 @@ import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any
 
@@ -24,6 +24,7 @@ from msgspec import Struct
 import revolve as rv
 from docs.studies.ecosystem.rows import course_rows, robot_rows, run_row
 from docs.studies.pages import DOCS, append_csv, csv_rows
+from schema.tables.description import DETAILS
 
 DATA = DOCS / "data" / "ecosystem"
 RUNS, COURSES, ROBOTS = (DATA / f"{name}.csv" for name in ("runs", "courses", "robots"))
@@ -68,6 +69,13 @@ class Planned(Struct, frozen=True):
         }
 
     @property
+    def plenty(self) -> float:
+        """Return a number that grows with the robots that can live, and so the time."""
+        if self.part == "chemostat":
+            return self.first / self.second
+        return {"gain": 10.0, "zones": 1000.0}.get(self.part, 0.0) * self.first
+
+    @property
     def parameters(self) -> dict[str, Any]:
         """Return the settings of the rules that differ from the shipped ones."""
         if self.part == "gain":
@@ -108,24 +116,24 @@ def planned() -> Iterator[Planned]:
 
 
 def missing(part: str | None) -> list[Planned]:
-    """Return the runs that have no row."""
+    """Return the runs that have no row; those that are expected to be short first."""
     kept = [tuple(row.values())[:4] for row in csv_rows(RUNS)]
-    return [
+    runs = [
         own
         for own in planned()
         if part in (None, own.part) and tuple(own.names.values()) not in kept
     ]
+    return sorted(runs, key=lambda own: own.plenty)
 
 
 def make(own: Planned, place: Path) -> None:
     """Make a run, and a control's neutral twin; keep the rows."""
     folder = place / "-".join(own.names.values())
-    shutil.rmtree(folder, ignore_errors=True)
     swept = {"parameters": own.parameters, "end_s": END_S}
     experiment = rv.Experiment.read("ecosystem", arena=swept)
     if own.part == "walkers":
         experiment = experiment.replace(founders=_walkers(own.seed, folder))
-    run = rv.run(experiment, seed=own.seed, workers=1, out=folder / "run")
+    run = finished(experiment, own.seed, folder / "run")
     if own.part == "control":
         # The twin first: the run's own row says that both are there.
         keep(own.names | {"part": "neutral"}, _neutral(experiment, run, own, folder))
@@ -137,7 +145,7 @@ def make(own: Planned, place: Path) -> None:
 def _walkers(seed: int, folder: Path) -> dict[str, Any]:
     """Return founders that walk: the last population of a run off-line."""
     walking = folder / "walking"
-    rv.run("scenario1", seed=seed, births=WALKING_BIRTHS, workers=1, out=walking)
+    finished(rv.Experiment.read("scenario1", births=WALKING_BIRTHS), seed, walking)
     return {"run": str(walking), "population": "last"}
 
 
@@ -149,7 +157,14 @@ def _neutral(
     times = {"births_s": children, "deaths_s": twin.deaths["sim_time_s"].to_pylist()}
     arena = {"rules": NEUTRAL, "parameters": own.parameters | times}
     neutral = experiment.replace(arena=arena)
-    return rv.run(neutral, seed=own.seed, workers=1, out=folder / "neutral")
+    return finished(neutral, own.seed, folder / "neutral")
+
+
+def finished(experiment: rv.Experiment, seed: int, out: Path) -> rv.Run:
+    """Return a run at its end; one that was begun is resumed."""
+    if (out / DETAILS).is_file():
+        return rv.resume(out, workers=1)
+    return rv.run(experiment, seed=seed, workers=1, out=out)
 
 
 def keep(names: dict[str, str], run: rv.Run) -> None:
@@ -167,6 +182,7 @@ def keep(names: dict[str, str], run: rv.Run) -> None:
 def main() -> None:
     """Make the runs that are missing."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", help="of the runs")
     parser.add_argument("--part", choices=SEEDS)
     parser.add_argument("--missing", action="store_true")
     options = parser.parse_args()
@@ -174,8 +190,10 @@ def main() -> None:
     if options.missing:
         print(f"{len(runs)} of {len([*planned()])} runs are missing")
         return
-    with TemporaryDirectory() as place, ThreadPoolExecutor(AT_ONCE) as pool:
-        for _ in pool.map(lambda own: make(own, Path(place)), runs):
+    if options.folder is None:
+        parser.error("FOLDER: needed to make runs")
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for _ in pool.map(lambda own: make(own, options.folder), runs):
             pass
 
 
