@@ -24,7 +24,7 @@ import schema.wire.status
 import schema.wire.updates
 from docs.struct_tables import attributes, introduction, rows
 from schema.agent import topics
-from schema.agent.topics import KEYS, Member, Role
+from schema.agent.topics import KEYS, FleetMember, Role
 from schema.experiment.identity import Origin
 from schema.robot.results import Evaluation, Report
 from schema.wire.codec import Message
@@ -91,7 +91,7 @@ def _keys() -> Iterator[str]:
     yield "|---|---|---|"
     for name in key_names():
         for role in _OF_ROLE.get(name, _ROLES):
-            member = Member("FLEET", role, "NAME")
+            member = FleetMember("FLEET", role, "NAME")
             found = getattr(member, name)
             key = found if isinstance(found, str) else _with_shard(found)
             yield f"| `{key}` | {role} | {_key_meaning(name)} |"
@@ -103,7 +103,7 @@ def _with_shard(poses: Any) -> str:  # noqa: ANN401 - a method of one number
 
 
 def _key_meaning(name: str) -> str:
-    text = attributes(Member).get(name) or introduction(getattr(Member, name))
+    text = attributes(FleetMember).get(name) or introduction(getattr(FleetMember, name))
     return re.sub("^[Kk]ey (that )?", "", text).removesuffix(".")
 
 

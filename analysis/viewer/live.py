@@ -19,7 +19,7 @@ from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
 from schema.agent.service import HubWatch, open_session, why_no_hub
 from schema.agent.topics import (
-    Member,
+    FleetMember,
     check_name,
     key_of_all,
     member_of,
@@ -163,7 +163,7 @@ class LiveSource:
         self._tokens.append(sample)
         self._has_news.set()
 
-    def _take_reply(self, member: Member, reply: zenoh.Reply) -> None:
+    def _take_reply(self, member: FleetMember, reply: zenoh.Reply) -> None:
         """Take a page of the state of a run, if its coordinator itself sent it."""
         if reply.ok is None:
             return

@@ -14,7 +14,7 @@ from analysis.viewer.recording import Recording
 from schema.experiment.grid import Grid
 from schema.robot.ids import BirthId
 from schema.wire.elites import Elite
-from schema.wire.updates import Birth, Death, Level
+from schema.wire.updates import Birth, Level, RecordedDeath
 
 SPACING_M = 0.6
 COLUMNS = 5
@@ -126,7 +126,7 @@ class Lineage:
         self._undrawn += 1
         return True
 
-    def remove(self, gone: Death) -> None:
+    def remove(self, gone: RecordedDeath) -> None:
         """Mark a robot as dead."""
         if gone.birth in self._entries:
             self._entries[gone.birth].is_alive = False

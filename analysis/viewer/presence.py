@@ -1,6 +1,6 @@
 """Presence of the hub and of the coordinator of a watched run."""
 
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 
 SETTLED_S = 1.0
 """Time without its coordinator after which a run has ended [s]."""
@@ -18,11 +18,11 @@ class Presence:
     """
 
     def __init__(self) -> None:
-        self.coordinators: dict[str, Member] = {}
+        self.coordinators: dict[str, FleetMember] = {}
         self.is_hub_there = True
         self.has_ended = False
         self._hubs: frozenset[str] = frozenset()
-        self._watched: Member | None = None
+        self._watched: FleetMember | None = None
         self._gone_s: float | None = None
         self._patience_s = SETTLED_S
 

@@ -26,7 +26,7 @@ from schema.experiment.grid import Grid
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.updates import Birth, Death, Level, Migrant, Update, WorkerInfo
+from schema.wire.updates import Birth, Level, Migrant, RecordedDeath, Update, WorkerInfo
 
 _REPEAT_S = 10.0
 """Interval at which a robot's boxes are logged again: a server drops its oldest data
@@ -64,7 +64,7 @@ class Show:
         # Number and time of each birth on an island [s], ascending.
         self._clocks = defaultdict[int, list[tuple[int, float]]](lambda: [(0, -inf)])
         self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
-        self._gone: dict[tuple[int, BirthId], Death] = {}
+        self._gone: dict[tuple[int, BirthId], RecordedDeath] = {}
         self._levels: set[tuple[int, int]] = set()
         self._moves: set[tuple[BirthId, int, int]] = set()
         self._workers: tuple[WorkerInfo, ...] | None = None
@@ -173,7 +173,7 @@ class Show:
             if key[1] not in shown:
                 del self._shown[key]
 
-    def _leave(self, gone: Death) -> None:
+    def _leave(self, gone: RecordedDeath) -> None:
         robot = self._shown.get((gone.island, gone.birth))
         if robot is not None and not robot.is_gone:
             robot.is_gone = True
@@ -195,7 +195,7 @@ class Show:
         text = f"{one.birth.name} is born{' to ' if parents else ''}{parents}"
         self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
 
-    def _departed(self, gone: Death) -> None:
+    def _departed(self, gone: RecordedDeath) -> None:
         if (gone.island, gone.birth) in self._gone:
             return
         self._gone[gone.island, gone.birth] = gone

@@ -14,7 +14,7 @@ import zenoh
 from schema.agent.address import UNIX, parse_address
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
 from schema.agent.service import open_session, usable, why_no_hub
-from schema.agent.topics import Member, Role, check_name, key_of_all, member_of
+from schema.agent.topics import FleetMember, Role, check_name, key_of_all, member_of
 from schema.errors import MalformedMessage, NetworkError
 from schema.wire.codec import encode
 from schema.wire.operator import (
@@ -68,7 +68,7 @@ def asking(
 
 def coordinators(
     session: zenoh.Session, fleet: str, timeout_s: float = ASK_TIMEOUT_S
-) -> set[Member]:
+) -> set[FleetMember]:
     """Return the coordinators whose token exists, up to a limit."""
     # Not by a channel: a full one blocks the session, or loses what is not read yet.
     keys: list[str] = []
@@ -92,7 +92,7 @@ def coordinators(
 
 
 def reply_of(
-    member: Member,
+    member: FleetMember,
     session: zenoh.Session,
     data: bytes,
     timeout_s: float = ASK_TIMEOUT_S,
@@ -111,7 +111,7 @@ def reply_of(
     return None
 
 
-def is_from(member: Member, reply: zenoh.Reply) -> bool:
+def is_from(member: FleetMember, reply: zenoh.Reply) -> bool:
     """Return whether a process's own session sent a reply; others can use its key."""
     replier = reply.replier_id
     return replier is not None and str(replier.zid) == member.session
@@ -216,10 +216,10 @@ def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
     return HubProbe("", round_trip_s, names, replies, tuple(malformed), offset_s, roles)
 
 
-def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[Member]]:
+def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[FleetMember]]:
     """Return the time of a query to the hub [s], and the coordinators there."""
     shortest_s: float | None = None
-    members: set[Member] = set()
+    members: set[FleetMember] = set()
     for _ in range(3):
         asked_s = time.monotonic()
         members |= coordinators(session, fleet, _STEP_S)
@@ -238,6 +238,6 @@ def _roles(
     keys: dict[str, Role] = {}
     for role in ROLES:
         separator = "." if role == "coordinator" else "-"
-        keys[Member(fleet, role, f"{name}{separator}doctor-{nonce}").trial] = role
+        keys[FleetMember(fleet, role, f"{name}{separator}doctor-{nonce}").trial] = role
     heard = usable(keys, session, config, _STEP_S) or ()
     return tuple(role for key, role in keys.items() if key in heard)

@@ -12,7 +12,7 @@ from math import inf
 
 from coordinator.dispatch.events import AgentKind, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
-from schema.agent.topics import Member, member_of, slot_of
+from schema.agent.topics import FleetMember, member_of, slot_of
 from schema.errors import MalformedMessage
 from schema.limits import INFO_BYTES, LONGEST_QUIET_S, MOST_MEMBERS, printable
 from schema.wire.codec import decode
@@ -35,24 +35,24 @@ class Membership:
 
     def __init__(self, version: str, faults: PeerFaults | None = None) -> None:
         """Initialise without agents; ``faults`` counts what is dropped."""
-        self.joined: dict[str, Member] = {}
+        self.joined: dict[str, FleetMember] = {}
         self.refused: dict[str, str] = {}
         self._faults = faults or PeerFaults()
         self._version = version
-        self._alive: set[Member] = set()
+        self._alive: set[FleetMember] = set()
         # How often they were asked without an answer.
-        self._silent: dict[Member, int] = {}
-        self._refused_members: dict[str, Member] = {}
+        self._silent: dict[FleetMember, int] = {}
+        self._refused_members: dict[str, FleetMember] = {}
         # Agents that left and may have died of their job, oldest first.
         self._gone: dict[str, None] = {}
 
     def __len__(self) -> int:
         return len(self._alive)
 
-    def __contains__(self, member: Member) -> bool:
+    def __contains__(self, member: FleetMember) -> bool:
         return member in self._alive
 
-    def appear(self, key: str) -> Member | None:
+    def appear(self, key: str) -> FleetMember | None:
         """Note a token; return its agent if that is to be asked for its properties.
 
         Beyond the limit it takes the place of an agent that does not answer; without
@@ -84,23 +84,23 @@ class Membership:
             del self._refused_members[name], self.refused[name]
         return self._leave(member)
 
-    def is_stranger(self, member: Member) -> bool:
+    def is_stranger(self, member: FleetMember) -> bool:
         """Return whether an agent is alive but its properties are not known yet."""
         known = (self.joined.get(member.name), self._refused_members.get(member.name))
         return member in self._alive and member not in known
 
-    def note_silence(self, member: Member) -> Left | None:
+    def note_silence(self, member: FleetMember) -> Left | None:
         """Note that an agent does not answer; return the event if it had joined."""
         if member not in self._alive:
             return None
         self._silent[member] = self._silent.get(member, 0) + 1
         return self._leave(member)
 
-    def silences(self, member: Member) -> int:
+    def silences(self, member: FleetMember) -> int:
         """Return how often an agent was asked without an answer."""
         return self._silent.get(member, 0)
 
-    def introduce(self, member: Member, data: bytes) -> list[Crash | Joined]:
+    def introduce(self, member: FleetMember, data: bytes) -> list[Crash | Joined]:
         """Take an agent's description of itself and of the processes it replaces.
 
         Returns:
@@ -127,7 +127,7 @@ class Membership:
         joined = Joined(agent, kind, info.slots, info.platform, info.shards, info.cores)
         return [*self._new_deaths(member, info), joined]
 
-    def progress(self, member: Member, data: bytes) -> Progressed | None:
+    def progress(self, member: FleetMember, data: bytes) -> Progressed | None:
         """Return the event if an agent that has joined reports progress."""
         if self.joined.get(member.name) != member:
             return None
@@ -135,11 +135,11 @@ class Membership:
         works = info.quiet_s is not None and 0.0 <= info.quiet_s <= LONGEST_QUIET_S
         return Progressed(member.name) if works else None
 
-    def _forget(self, member: Member) -> None:
+    def _forget(self, member: FleetMember) -> None:
         self._alive.discard(member)
         self._silent.pop(member, None)
 
-    def _leave(self, member: Member) -> Left | None:
+    def _leave(self, member: FleetMember) -> Left | None:
         if self.joined.get(member.name) != member:
             return None
         del self.joined[member.name]
@@ -148,7 +148,7 @@ class Membership:
             del self._gone[next(iter(self._gone))]
         return Left(member.name)
 
-    def _new_deaths(self, member: Member, info: AgentInfo) -> list[Crash]:
+    def _new_deaths(self, member: FleetMember, info: AgentInfo) -> list[Crash]:
         """Return the deaths of an agent's predecessors, each once.
 
         Deaths of agents that never joined happened before this coordinator began.
@@ -180,18 +180,18 @@ class InfoQueue:
 
     def __init__(self) -> None:
         self.due_s = inf
-        self._new: deque[Member] = deque(maxlen=MOST_MEMBERS)
-        self._again: list[tuple[float, int, Member]] = []
+        self._new: deque[FleetMember] = deque(maxlen=MOST_MEMBERS)
+        self._again: list[tuple[float, int, FleetMember]] = []
         self._order = count()
         self._pause_until_s = 0.0
         self._is_oldest_next = False
 
-    def add(self, member: Member) -> None:
+    def add(self, member: FleetMember) -> None:
         """Add an agent that is to be asked as soon as possible."""
         self._new.append(member)
         self._schedule()
 
-    def add_again(self, member: Member, silences: int, now_s: float) -> None:
+    def add_again(self, member: FleetMember, silences: int, now_s: float) -> None:
         """Add an agent that is to be asked after a pause.
 
         ``silences``: how often it was asked without an answer.
@@ -200,7 +200,7 @@ class InfoQueue:
         heappush(self._again, (now_s + pause_s, next(self._order), member))
         self._schedule()
 
-    def take(self) -> Member:
+    def take(self) -> FleetMember:
         """Remove and return the next agent to ask; call it when it is due."""
         if self._new:
             is_oldest = self._is_oldest_next
@@ -221,7 +221,7 @@ class InfoQueue:
         self.due_s = max(self._pause_until_s, waits_s)
 
 
-def _parsed(member: Member, data: bytes) -> AgentInfo:
+def _parsed(member: FleetMember, data: bytes) -> AgentInfo:
     """Return the message of an agent's own properties; see ``introduce``."""
     role, agent = member.role, member.name
     try:

@@ -12,7 +12,7 @@ import zenoh
 
 from coordinator.network.client_service import is_from
 from coordinator.network.operator_service import OperatorQuery
-from schema.agent.topics import Member, key_of_all, member_of
+from schema.agent.topics import FleetMember, key_of_all, member_of
 from schema.errors import MalformedMessage
 from schema.limits import MIGRANTS_REQUEST_BYTES, MOST_PEERS, MOST_QUERIES
 from schema.wire.codec import encode
@@ -54,7 +54,7 @@ class MigrationService:
     """Requests for migrants and announcements, in both directions."""
 
     def __init__(
-        self, session: zenoh.Session, me: Member, wake: Callable[[], None]
+        self, session: zenoh.Session, me: FleetMember, wake: Callable[[], None]
     ) -> None:
         """Listen in a session; ``wake`` ends the wait of the main thread."""
         self._session, self._me = session, me

@@ -47,7 +47,7 @@ from schema.agent.service import (
     session_config,
     why_no_hub,
 )
-from schema.agent.topics import Member, check_name, key_of_all
+from schema.agent.topics import FleetMember, check_name, key_of_all
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     BUNDLE_BYTES,
@@ -85,7 +85,7 @@ class _Asked:
         wait_s: the longest that it takes [s].
     """
 
-    member: Member
+    member: FleetMember
     open: dict[int, int]
     inbox: "Inbox[_News]"
     wait_s: float
@@ -205,7 +205,7 @@ class Network:
         self.own_address = connect or new_socket()
         self.address = connect or (*listen, self.own_address)[0]
         self.faults = PeerFaults()
-        self._me = Member(
+        self._me = FleetMember(
             check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
         )
         self._config = (
@@ -222,7 +222,7 @@ class Network:
         self._inbox: Inbox[_News] = Inbox()
         self._membership = Membership(wire_version(), self.faults)
         self._info_queue = InfoQueue()
-        self._asked_infos: set[Member] = set()
+        self._asked_infos: set[FleetMember] = set()
         self.queries = Queries(self._me.state, self.faults)
         self._outlet = Outlet()
         self._unsent: dict[str, _Unsent] = {}
@@ -318,7 +318,7 @@ class Network:
         """Send the jobs of an agent that are not sent."""
         unsent = self._unsent.pop(agent)
         member = self._membership.joined.get(agent)
-        to = member or Member(self._me.fleet, "worker", agent)
+        to = member or FleetMember(self._me.fleet, "worker", agent)
         jobs = dict(enumerate(unsent.numbers))
         asked = _Asked(to, jobs, self._inbox, unsent.wait_s)
         if member is None:
@@ -419,7 +419,7 @@ class Network:
             self._info_queue.add(member)
         return []
 
-    def _ask_info(self, member: Member) -> None:
+    def _ask_info(self, member: FleetMember) -> None:
         """Ask an agent for its properties, later if too many are asked."""
         if member in self._asked_infos or member not in self._membership:
             return
@@ -432,7 +432,7 @@ class Network:
         self._ask(asked, member.info, wire_version().encode())
 
     def _introduced(
-        self, member: Member, reply: zenoh.Reply | None
+        self, member: FleetMember, reply: zenoh.Reply | None
     ) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""
         membership = self._membership

@@ -15,7 +15,7 @@ from coordinator.parts.exchange import Exchange, PartResult, continued, joined
 from coordinator.parts.partition import GROWTH_M, divide, groups_of
 from schema.parts import Vector
 from schema.robot.ids import BirthId
-from schema.wire.arena import Advance, AdvanceShard, Box, Changes, Part, Rebuild
+from schema.wire.arena import Advance, AdvanceShard, ArenaPart, Box, Changes, Rebuild
 from schema.wire.arena_state import ArenaState, states_of
 from schema.wire.codec import encode
 
@@ -153,7 +153,7 @@ class ArenaParts:
         arrivals = states_of(self._before, births - kept)
         judges = self.until == requested.until
         works = self._works
-        own = Part(
+        own = ArenaPart(
             number=part,
             departures=() if is_whole else tuple(sorted(held.births - kept)),
             arrivals=b"" if is_whole or not arrivals.robots else encode(arrivals),

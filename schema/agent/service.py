@@ -38,7 +38,7 @@ from schema.agent.supervisor import (
     stop_on_signals,
     stop_with_parent,
 )
-from schema.agent.topics import Member, check_name, unique_name
+from schema.agent.topics import FleetMember, check_name, unique_name
 from schema.errors import NetworkError, counted
 from schema.limits import MOST_SHOWN, printable
 from schema.plugins.permission import allow
@@ -88,7 +88,7 @@ def open_session(config: zenoh.Config, *, is_agent: bool = False) -> zenoh.Sessi
         os.environ.update(chosen)
 
 
-def session_config(text: str, member: Member) -> zenoh.Config:
+def session_config(text: str, member: FleetMember) -> zenoh.Config:
     """Return the configuration of a process's session, with its id."""
     config = zenoh.Config.from_json5(text)
     config.insert_json5("id", json.dumps(member.session))
@@ -177,7 +177,7 @@ class HubWatch:
             self.warn(f"{line}{self._advice}; retrying; press Ctrl-C to stop")
         self._told, self._tell_s = line, time.monotonic() + _TELL_AGAIN_S
 
-    def look(self, session: zenoh.Session, me: Member) -> None:
+    def look(self, session: zenoh.Session, me: FleetMember) -> None:
         """Do ``seen`` for a session; tell if a new hub drops what it sends."""
         if not self.seen(session.info.routers_zid()) or not self._advice:
             return
@@ -318,7 +318,7 @@ def serve(
     """
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
-    me = Member(agent.fleet, agent.role, agent.name)
+    me = FleetMember(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(compute, agent, slot)
     hub = HubWatch(
@@ -391,7 +391,7 @@ def _serve_session(
     server: Server,
     hub: HubWatch,
     stop: threading.Event,
-    me: Member,
+    me: FleetMember,
 ) -> None:
     inbox: Inbox[zenoh.Query] = Inbox()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)

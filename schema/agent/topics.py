@@ -29,7 +29,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
+class FleetMember:
     """A process of a fleet; a fleet serves many runs.
 
     Attributes:
@@ -89,13 +89,13 @@ def key_of_all(fleet: str, role: Role, key: str) -> str:
     return f"revolve/{fleet}/{_CHUNKS[role]}/*/{key}"
 
 
-def member_of(key: str) -> Member:
+def member_of(key: str) -> FleetMember:
     """Return the process of a liveliness token; ``MalformedMessage`` for other keys."""
     chunks = key.split("/")
     if len(chunks) == 5 and (chunks[0], chunks[4]) == ("revolve", "alive"):  # noqa: PLR2004 - five chunks
         _, fleet, chunk, name, _ = chunks
         if chunk in _ROLES and _NAME.fullmatch(fleet) and _NAME.fullmatch(name):
-            return Member(fleet, _ROLES[chunk], name)
+            return FleetMember(fleet, _ROLES[chunk], name)
     raise MalformedMessage(
         f"must be revolve/FLEET/w|an|co/NAME/alive, got {printable(key)!r}"
     )

@@ -100,7 +100,7 @@ class Rebuild(Message, frozen=True):
     living: Births | None = None
 
 
-class Part(Message, frozen=True):
+class ArenaPart(Message, frozen=True):
     """What is different for a worker that advances only a part of an arena's robots.
 
     Attributes:
@@ -147,7 +147,7 @@ class AdvanceShard(Message, frozen=True, tag="advance"):
     from_step: Count = 0
     from_digest: Annotated[bytes, Meta(max_length=32)] = b""
     rebuild: Rebuild | None = None
-    part: Part | None = None
+    part: ArenaPart | None = None
 
 
 class Judgement(Message, frozen=True, array_like=True):

@@ -42,7 +42,7 @@ class Birth(Message, frozen=True):
     body: Annotated[tuple[Part, ...], Meta(max_length=MOST_PARTS)] | None
 
 
-class Death(Message, frozen=True):
+class RecordedDeath(Message, frozen=True):
     """A death in an arena.
 
     Attributes:
@@ -158,7 +158,7 @@ class Update(Message, frozen=True):
     is_whole: bool
     experiment: str
     births: tuple[Birth, ...] = ()
-    deaths: tuple[Death, ...] = ()
+    deaths: tuple[RecordedDeath, ...] = ()
     levels: tuple[Level, ...] = ()
     migrants: tuple[Migrant, ...] = ()
     workers: tuple[WorkerInfo, ...] = ()
@@ -237,10 +237,10 @@ def individual(row: Mapping[str, Any]) -> BirthId:
     return BirthId(row["island"] if island is None else island, row["birth"])
 
 
-def read_death(row: Mapping[str, Any]) -> Death:
+def read_death(row: Mapping[str, Any]) -> RecordedDeath:
     """Return the death of a row of the deaths table."""
     time_s, reason = row["sim_time_s"], row["reason"]
-    return Death(row["island"], individual(row), row["births"], time_s, reason)
+    return RecordedDeath(row["island"], individual(row), row["births"], time_s, reason)
 
 
 def arenas_of(births: Iterable[Birth]) -> set[int]:

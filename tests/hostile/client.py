@@ -26,7 +26,7 @@ from schema.agent.machine import wire_version
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.service import session_config
 from schema.agent.supervisor import stop_on_signals
-from schema.agent.topics import Member, Role, key_of_all, member_of
+from schema.agent.topics import FleetMember, Role, key_of_all, member_of
 from schema.errors import MalformedMessage
 from schema.limits import ADVANCE_REQUEST_BYTES, BUNDLE_BYTES, MOST_EPOCH
 from schema.robot.ids import BirthId
@@ -112,11 +112,11 @@ class HostileClient:
         self._held: deque[zenoh.Query] = deque(maxlen=_KEPT)
         self._kept: list[object] = []
         self._session = self._open(client_config(address))
-        self._liars: list[Member] = []
-        self._members: list[Member] = []
+        self._liars: list[FleetMember] = []
+        self._members: list[FleetMember] = []
         self._listen()
 
-    def _open(self, config: str, member: Member | None = None) -> zenoh.Session:
+    def _open(self, config: str, member: FleetMember | None = None) -> zenoh.Session:
         made = (
             session_config(config, member)
             if member
@@ -143,7 +143,7 @@ class HostileClient:
         """Join as agents and as a coordinator."""
         for role in _ROLES:
             for number in range(_LIARS):
-                liar = Member("default", role, f"liar-{role}-{number}.{number:08}")
+                liar = FleetMember("default", role, f"liar-{role}-{number}.{number:08}")
                 session = self._open(client_config(self._address), liar)
                 for key in (liar.jobs, liar.info, liar.command, liar.state):
                     lie = zenoh.handlers.Callback(self._lie_as(liar))
@@ -214,7 +214,7 @@ class HostileClient:
                     self._heard[kind].extend(jobs)
             self._reply(query, kind, "foreign")
 
-    def _lie_as(self, liar: Member) -> Callable[[zenoh.Query], None]:
+    def _lie_as(self, liar: FleetMember) -> Callable[[zenoh.Query], None]:
         """Return a function that replies as an agent that joined."""
 
         def lie(query: zenoh.Query) -> None:
@@ -293,7 +293,7 @@ class HostileClient:
             )
         )
 
-    def _token(self, member: Member) -> None:
+    def _token(self, member: FleetMember) -> None:
         """Declare a token of another role, of a process that is there, or of none."""
         draw = self._mutator.random
         key = draw.choice(
@@ -311,7 +311,7 @@ class HostileClient:
         token.undeclare()  # type: ignore[no-untyped-call]
 
 
-def _info(liar: Member) -> bytes:
+def _info(liar: FleetMember) -> bytes:
     """Return a valid description; its predecessors died of the jobs of others."""
     info = AgentInfo(
         agent=liar.name,
@@ -332,7 +332,7 @@ def _samples() -> list[bytes]:
 def _answers(kind: str) -> list[bytes]:
     """Return answers to no job, descriptions of nobody, or replies to nobody."""
     if kind == "info":
-        return [_info(Member("default", "worker", "nobody"))]
+        return [_info(FleetMember("default", "worker", "nobody"))]
     if kind in ("command", "state"):
         return [encode(update())]
     results = (Evaluation(99.0, 0.0, 0.0, 1.0), Failure("diverged"), StateMissing())

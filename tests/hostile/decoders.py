@@ -25,7 +25,7 @@ from coordinator.storage.journal import decode_record, encode_event
 from revolve.fleet import _read_value
 from schema.agent.network import Agent
 from schema.agent.request_handler import Server
-from schema.agent.topics import Member, member_of
+from schema.agent.topics import FleetMember, member_of
 from schema.errors import (
     ExperimentError,
     InvalidRobot,
@@ -107,9 +107,9 @@ from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 from schema.wire.updates import (
     ArenaSample,
     Birth,
-    Death,
     Level,
     Migrant,
+    RecordedDeath,
     Update,
     WorkerInfo,
     decode_page,
@@ -123,7 +123,7 @@ from worker.arena.world import World
 
 JOB = (3, 5)
 _VERSION = "1"
-_WORKER = Member("default", "worker", "w.00000001")
+_WORKER = FleetMember("default", "worker", "w.00000001")
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,7 +285,7 @@ def update() -> Update:
         True,
         "experiment",
         (Birth(BIRTH, (BIRTH,), 1, 1, 1.0, body), Birth(BIRTH, (), 0, 2, None, None)),
-        (Death(0, BIRTH, 2, 2.0, "culled"),),
+        (RecordedDeath(0, BIRTH, 2, 2.0, "culled"),),
         (Level(0, 2, 1, 1, 0.5, 0.5, (BIRTH,)),),
         (Migrant(BIRTH, 0, 1, 1, 2, 3.0),),
         (WorkerInfo("w", "platform", (0,)),),

@@ -8,6 +8,7 @@ revolve/ and reports file and library directly.
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -101,6 +102,18 @@ def test_library_is_imported_only_by_permitted_files(library: str) -> None:
 def test_no_room_imports_test_only_libraries() -> None:
     violations = {relative(path): TEST_ONLY & set(imported(path)) for path in sources()}
     assert {path: names for path, names in violations.items() if names} == {}
+
+
+def test_public_classes_have_names_of_their_own() -> None:
+    """A class of the Python interface may be named as what it stands for."""
+    classes = Counter(
+        node.name
+        for path in sources()
+        for node in ast.parse(path.read_bytes()).body
+        if isinstance(node, ast.ClassDef) and node.name[0] != "_"
+    )
+    twice = {name for name, count in classes.items() if count > 1}
+    assert twice == {"Arena", "Experiment", "Robot", "Simulation"}
 
 
 def test_no_file_uses_type_checking_imports() -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
 from schema.agent.service import session_config
-from schema.agent.topics import Member, Role
+from schema.agent.topics import FleetMember, Role
 from schema.limits import ADVANCE_REQUEST_BYTES, BUNDLE_BYTES
 from schema.robot.results import Evaluation
 from schema.wire.codec import decode, encode, fingerprint
@@ -51,7 +51,7 @@ class Attacker:
         self.session = stack.enter_context(zenoh.open(config))
         self._held: list[Any] = []
 
-    def agents(self, role: Role) -> list[Member]:
+    def agents(self, role: Role) -> list[FleetMember]:
         """Return the agents of the run that are alive."""
         return alive(self.session, role)
 
@@ -135,7 +135,9 @@ class Attacker:
         """Join as successors of the run's workers that their jobs crashed."""
         for member in self.agents("worker"):
             for number in numbers:
-                fake = Member("default", "worker", f"{member.name[:-8]}{number:08}")
+                fake = FleetMember(
+                    "default", "worker", f"{member.name[:-8]}{number:08}"
+                )
                 config = session_config(client_config(self._address), fake)
                 session = self._stack.enter_context(zenoh.open(config))
                 job = RunningJob(member.name, self.run, 1, number, bytes(8))

@@ -16,7 +16,7 @@ from coordinator.islands.events import Advanced
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.machine import platform_tag, wire_version
 from schema.agent.network import Tls, client_config
-from schema.agent.topics import Member, Role, key_of_all, member_of
+from schema.agent.topics import FleetMember, Role, key_of_all, member_of
 from schema.wire.codec import encode
 from schema.wire.messages import AgentInfo, Crash
 from tests.system.workspace import Process, Workspace, wait_until
@@ -165,14 +165,14 @@ def tls_flags(tls: Tls) -> tuple[str, ...]:
     return ("--tls-ca", tls.ca, *own)
 
 
-def alive(session: zenoh.Session, role: Role) -> list[Member]:
+def alive(session: zenoh.Session, role: Role) -> list[FleetMember]:
     """Return the processes of a role whose tokens a session may see, by name."""
     tokens = session.liveliness().get(key_of_all("default", role, "alive"), timeout=2.0)
     members = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
     return sorted(members, key=lambda member: member.name)
 
 
-def introduce(session: zenoh.Session, member: Member, *deaths: Crash) -> Any:  # noqa: ANN401 - of Zenoh
+def introduce(session: zenoh.Session, member: FleetMember, *deaths: Crash) -> Any:  # noqa: ANN401 - of Zenoh
     """Declare a queryable that says what a good agent of this machine says.
 
     Returns:

@@ -20,7 +20,7 @@ from schema.agent.network import client_config
 from schema.agent.request_handler import answer
 from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
-from schema.agent.topics import Member, unique_name
+from schema.agent.topics import FleetMember, unique_name
 from schema.limits import BUNDLE_BYTES
 from schema.wire.codec import decode, encode
 from schema.wire.messages import Jobs, Reply, Request
@@ -42,7 +42,7 @@ def main(address: str, behaviour: str) -> None:
     compute = Work(Shards(World)).answer
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
-    member = Member("default", "worker", unique_name("odd"))
+    member = FleetMember("default", "worker", unique_name("odd"))
     inbox: Inbox[zenoh.Query] = Inbox()
     count = held_back = 0
     is_cancelled = threading.Event()

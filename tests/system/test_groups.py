@@ -11,7 +11,7 @@ from coordinator.islands.exchange import MigrantsReply
 from coordinator.storage.compare import compare
 from schema.agent.network import client_config
 from schema.agent.service import session_config
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.limits import MIGRANTS_REQUEST_BYTES
 from schema.wire.codec import decode, encode
 from schema.wire.migration import MigrantsRequest
@@ -35,7 +35,7 @@ def coordinator(workspace: Workspace, number: int, address: str) -> Process:
 @contextmanager
 def liar(address: str) -> Iterator[None]:
     """Answer all requests for migrants falsely, by the keys of a coordinator."""
-    member = Member("default", "coordinator", "liar.1")
+    member = FleetMember("default", "coordinator", "liar.1")
     config = session_config(client_config(address), member)
 
     def lie(query: zenoh.Query) -> None:

@@ -20,7 +20,7 @@ import zenoh
 
 from coordinator.storage.compare import compare
 from schema.agent.network import client_config
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from tests.hostile.decode import peak_mb
 from tests.system.documents import HAMLET, SCENARIO1
 from tests.system.fleet import Fleet, agent_processes
@@ -67,7 +67,7 @@ def _wait_for_viewer(address: str) -> None:
     """Wait until a viewer subscribes to the news of coordinators."""
     config = zenoh.Config.from_json5(client_config(address))
     with zenoh.open(config) as session:
-        key = Member("default", "coordinator", "nobody").events
+        key = FleetMember("default", "coordinator", "nobody").events
         publisher = session.declare_publisher(key)
         # Zenoh's stubs call the status a bool; it is an object that is always true.
         status: Callable[[], Any] = lambda: publisher.matching_status  # noqa: E731

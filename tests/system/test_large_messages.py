@@ -13,7 +13,7 @@ import pytest
 import zenoh
 
 from schema.agent.network import client_config
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.limits import MIB, PAGE_BYTES
 from tests.system.fleet import kit_files, make_kit
 from tests.system.workspace import (
@@ -27,8 +27,8 @@ pytestmark = [pytest.mark.system, pytest.mark.slow]
 
 TIMES = 20
 LENGTHS = (1_000, 64_000, 1_000_000, 30_000_000)
-CHIEF = Member("default", "coordinator", "chief.1")
-WORKER = Member("default", "worker", "w-0.1")
+CHIEF = FleetMember("default", "coordinator", "chief.1")
+WORKER = FleetMember("default", "worker", "w-0.1")
 MOST_QUERIES_PER_S = 10.0
 MOST_QUERY_BYTES = 64
 PROMPT_S = 4.0

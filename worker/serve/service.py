@@ -5,7 +5,7 @@ from functools import lru_cache
 from schema.agent.network import Agent
 from schema.agent.service import Outlet, own_agent, serve_as_process
 from schema.agent.supervision import ProcessSlot
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.tables.arrow import skip_pandas
 from worker.arena.world import World
 from worker.serve.jobs import Jobs
@@ -15,7 +15,7 @@ from worker.serve.shards import Shards
 def process(agent: Agent, slot: ProcessSlot) -> None:
     """Run one process of a worker; returns when asked to stop."""
     own = own_agent(agent, slot.index)
-    member = Member(own.fleet, own.role, own.name)
+    member = FleetMember(own.fleet, own.role, own.name)
     outlet = Outlet()
     skip_pandas()
     shards = Shards(

@@ -23,9 +23,9 @@ from schema.robot.robot import check_robot
 from schema.wire.arena import (
     Advance,
     AdvanceShard,
+    ArenaPart,
     Changes,
     Live,
-    Part,
     Rebuild,
 )
 from schema.wire.arena_state import ArenaState
@@ -182,7 +182,7 @@ def _advance(world: World, work: AdvanceShard) -> Advance:
     )
 
 
-def _work_before(world: World, part: Part | None) -> dict[BirthId, float]:
+def _work_before(world: World, part: ArenaPart | None) -> dict[BirthId, float]:
     """Return the work of robots earlier in an advance [J]."""
     if part is None or not part.work_j:
         return {}

@@ -37,7 +37,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
 from schema.wire.elites import Elite
-from schema.wire.updates import ArenaSample, Birth, Death, Level, Update
+from schema.wire.updates import ArenaSample, Birth, Level, RecordedDeath, Update
 from tests.coordinator.arena_world import poses
 from tests.documents import parse_experiment
 
@@ -106,7 +106,7 @@ def test_a_death_has_as_many_births_as_the_last_pose() -> None:
     first, second = (Birth(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE.parts)
                      for n in range(2))  # fmt: skip
     # At 10 s the second is born and the first dies: one birth, says the table.
-    death = Death(0, first.birth, 1, 10.0, "cull")
+    death = RecordedDeath(0, first.birth, 1, 10.0, "cull")
     show.tell(replace(WHOLE, births=(first, second), deaths=(death,)))
     rows = [
         {"record": n, "island": 0, "birth": 0, "sim_time_s": 9.0 + n, "angles": [],

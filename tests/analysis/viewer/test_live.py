@@ -11,14 +11,14 @@ from analysis.viewer.presence import PATIENCE_S, SETTLED_S, Presence
 from schema.agent.address import new_socket
 from schema.agent.network import client_config, hub_config
 from schema.agent.service import session_config
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode
 from schema.wire.updates import Birth, Page, Update, decode_page, pages_of
 
 LONGEST_S = 30.0
-CHIEF = Member("default", "coordinator", "chief.1")
-OTHER = Member("default", "coordinator", "another.1")
+CHIEF = FleetMember("default", "coordinator", "chief.1")
+OTHER = FleetMember("default", "coordinator", "another.1")
 
 
 def news(
@@ -77,7 +77,9 @@ class Chief:
         sent: numbers of the pages that it sent.
     """
 
-    def __init__(self, member: Member, session: zenoh.Session, state: Update) -> None:
+    def __init__(
+        self, member: FleetMember, session: zenoh.Session, state: Update
+    ) -> None:
         self.asked: list[Page] = []
         self.sent: list[int] = []
         self._member, self._session = member, session
@@ -147,7 +149,7 @@ HUB, NEW_HUB, CHIEFS_HUB = (frozenset({name}) for name in ("a0", "b1", CHIEF.ses
 NONE: frozenset[str] = frozenset()
 BOTH = (CHIEF, OTHER)
 
-Step = tuple[tuple[Member, ...], frozenset[str], float]
+Step = tuple[tuple[FleetMember, ...], frozenset[str], float]
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,14 @@ from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part
 from schema.wire.arena import Advance, Live, Poses
-from schema.wire.updates import ArenaSample, Birth, Death, Migrant, Update, WorkerInfo
+from schema.wire.updates import (
+    ArenaSample,
+    Birth,
+    Migrant,
+    RecordedDeath,
+    Update,
+    WorkerInfo,
+)
 from tests.coordinator.arena_world import poses
 
 
@@ -160,7 +167,7 @@ FORGED: dict[str, Update] = {
         news(3), births=(Birth(BirthId(0, 9), (), 1, 1, 1e308, None),)
     ),
     "death before the start": replace(
-        news(3), deaths=(Death(0, BirthId(0, 1), 1, -1e300, "culled"),)
+        news(3), deaths=(RecordedDeath(0, BirthId(0, 1), 1, -1e300, "culled"),)
     ),
     "unknown island": news(3, (4_000_000_000, 0)),
     "sample of no island": replace(news(3), samples=(ArenaSample(99, 1.0),)),

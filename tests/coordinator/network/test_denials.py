@@ -16,7 +16,7 @@ from coordinator.network.operator_service import OperatorQuery
 from schema.agent.access import read_certificates
 from schema.agent.network import Tls, client_config, hub_config
 from schema.agent.service import HubWatch, session_config, usable
-from schema.agent.topics import Member, Role
+from schema.agent.topics import FleetMember, Role
 from schema.wire.codec import decode
 from schema.wire.migration import MigrantsRequest, Needed
 from tests.system.workspace import free_address, wait_until
@@ -94,7 +94,7 @@ def test_a_process_says_that_the_hub_drops_what_it_sends(
     lines: list[str] = []
     tls = lab.tls(name)
     watch = lab.watch(tls, lines.append)
-    me = Member("lab", role, f"{name}{'.' if role == 'coordinator' else '-'}0.1")
+    me = FleetMember("lab", role, f"{name}{'.' if role == 'coordinator' else '-'}0.1")
     with zenoh.open(
         zenoh.Config.from_json5(client_config(lab.address, tls))
     ) as session:
@@ -153,7 +153,7 @@ REQUEST = MigrantsRequest("name", b"digest", 0, 1, (Needed(1, 0, 3),))
 def migration(lab: Lab, stack: ExitStack, name: str, role: Role) -> MigrationService:
     """Open a session with a certificate, as one of a coordinator would."""
     separator = "." if role == "coordinator" else "-"
-    me = Member("lab", role, f"{name}{separator}0.2")
+    me = FleetMember("lab", role, f"{name}{separator}0.2")
     config = session_config(client_config(lab.address, lab.tls(name)), me)
     return MigrationService(
         stack.enter_context(zenoh.open(config)), me, wake=lambda: None

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from coordinator.dispatch.events import Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.network.membership import LONGEST_PAUSE_S, SHARE, InfoQueue, Membership
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.errors import MalformedMessage
 from schema.limits import (
     INFO_BYTES,
@@ -23,7 +23,7 @@ from schema.limits import (
 from schema.wire.codec import encode
 from schema.wire.messages import AgentInfo, Crash, RunningJob
 
-WORKER = Member("f", "worker", "host-0.w")
+WORKER = FleetMember("f", "worker", "host-0.w")
 NAME = WORKER.name
 
 
@@ -77,13 +77,13 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
     assert membership.refused == {}
 
 
-def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
+def with_death(member: FleetMember, of: str, cause: str = "SIGSEGV") -> bytes:
     crash = Crash(RunningJob(of, "r", 3, 7, bytes(8)), cause)
     return info(agent=member.name, kind=member.role, deaths=(crash,))
 
 
-def successor(member: Member, letter: str) -> Member:
-    return Member("f", member.role, f"host-0.{letter}")
+def successor(member: FleetMember, letter: str) -> FleetMember:
+    return FleetMember("f", member.role, f"host-0.{letter}")
 
 
 def test_each_death_is_reported_once_and_before_the_successor_joins(
@@ -112,7 +112,7 @@ def test_a_death_that_did_not_happen_is_dropped(
         membership.introduce(WORKER, info())
     if state == "of another slot":
         membership.vanish(WORKER.alive)
-        liar = Member("f", "worker", "host-1.x")
+        liar = FleetMember("f", "worker", "host-1.x")
     else:
         liar = successor(WORKER, "x")
     membership.appear(liar.alive)
@@ -123,7 +123,7 @@ def test_a_death_that_did_not_happen_is_dropped(
 
 
 def test_a_token_counts_only_under_its_own_roles_prefix(membership: Membership) -> None:
-    forged = Member("f", "analyzer", NAME)
+    forged = FleetMember("f", "analyzer", NAME)
     membership.introduce(WORKER, info())
     assert membership.appear(forged.alive) == forged
     assert membership.vanish(forged.alive) is None
@@ -139,7 +139,7 @@ def test_a_forged_token_that_came_first_does_not_keep_the_worker_out(
     faults: PeerFaults,
 ) -> None:
     membership = Membership("1", faults)
-    membership.appear(Member("f", "analyzer", NAME).alive)
+    membership.appear(FleetMember("f", "analyzer", NAME).alive)
     assert membership.appear(WORKER.alive) == WORKER
     assert membership.introduce(WORKER, info()) == [joined(NAME)]
 
@@ -149,13 +149,13 @@ def test_agents_that_do_not_answer_make_room_for_others(
 ) -> None:
     membership.introduce(WORKER, info())
     for number in range(3 * MOST_MEMBERS):
-        fake = Member("f", "worker", f"fake{number}")
+        fake = FleetMember("f", "worker", f"fake{number}")
         assert membership.appear(fake.alive) == fake
         membership.note_silence(fake)
     assert len(membership) == MOST_MEMBERS
     assert faults.total("crowd") == 2 * MOST_MEMBERS + 1
     assert len(faults.counts) <= MOST_PEERS + 1
-    late = Member("f", "worker", "host-0.late")
+    late = FleetMember("f", "worker", "host-0.late")
     assert membership.appear(late.alive) == late
     data = info(agent=late.name)
     assert membership.introduce(late, data) == [joined(late.name)]
@@ -237,11 +237,11 @@ def test_agent_reports_progress_if_its_job_used_cpu_lately(
     assert membership.progress(WORKER, data) is None
 
 
-def member(name: str) -> Member:
-    return Member("f", "worker", name)
+def member(name: str) -> FleetMember:
+    return FleetMember("f", "worker", name)
 
 
-def due(queue: InfoQueue, now_s: float) -> Member | None:
+def due(queue: InfoQueue, now_s: float) -> FleetMember | None:
     """Return the agent that is to be asked at a time, if there is one."""
     return queue.take() if now_s >= queue.due_s else None
 

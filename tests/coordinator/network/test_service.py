@@ -32,7 +32,7 @@ from coordinator.network.operator_service import OperatorQuery
 from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.service import session_config
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import (
     ANSWER_BYTES,
@@ -195,7 +195,7 @@ def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
         with zenoh.open(config) as session:
 
             def quiet_s(name: str) -> float:
-                (reply,) = session.get(Member("default", "worker", name).info)
+                (reply,) = session.get(FleetMember("default", "worker", name).info)
                 assert reply.ok is not None
                 data = reply.ok.payload.to_bytes()
                 quiet_s = decode(AgentInfo, data, INFO_BYTES).quiet_s
@@ -370,7 +370,7 @@ def test_an_agent_of_another_version_is_refused(network: Network) -> None:
 def test_a_malformed_message_is_counted_and_dropped(
     network: Network, info: bytes
 ) -> None:
-    peer = Member("default", "worker", "x")
+    peer = FleetMember("default", "worker", "x")
 
     def tell(query: zenoh.Query) -> None:
         with query:
@@ -414,7 +414,7 @@ def test_a_query_with_a_wildcard_gets_a_reply_of_each_key(
     network: Network, end: str
 ) -> None:
     """The reply to such a query must not be on another key: that is an error."""
-    member = Member("default", "coordinator", "c")
+    member = FleetMember("default", "coordinator", "c")
     config = zenoh.Config.from_json5(client_config(network.address))
     key = member.command.replace("/command", f"/{end}")
     pattern = key.replace("$", "")
@@ -432,7 +432,7 @@ def test_a_query_with_a_wildcard_gets_a_reply_of_each_key(
 
 
 def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> None:
-    member = Member("default", "coordinator", "c")
+    member = FleetMember("default", "coordinator", "c")
     config = zenoh.Config.from_json5(client_config(network.address))
     with zenoh.open(config) as session:
         replies = session.get(member.command, payload=bytes(OPERATOR_REQUEST_BYTES + 1))
@@ -451,7 +451,7 @@ def test_a_hub_without_a_coordinator_of_the_fleet_is_told(network: Network) -> N
 
 
 def test_replies_of_a_liar_end_each_of_its_jobs_once(network: Network) -> None:
-    peer = Member("default", "worker", "x")
+    peer = FleetMember("default", "worker", "x")
     replies = (
         encode([Reply(1, b"first")]),
         encode([Reply(1, b"second"), Reply(7, b"of no job"), Reply(2, reason="no")]),

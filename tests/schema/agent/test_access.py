@@ -15,7 +15,7 @@ from schema.agent.access import (
     read_certificates,
 )
 from schema.agent.topics import (
-    Member,
+    FleetMember,
     check_name,
     key_of_all,
     member_of,
@@ -23,10 +23,10 @@ from schema.agent.topics import (
 )
 from schema.errors import MalformedMessage, NetworkError
 
-WORKER = Member("default", "worker", "a-0.1234abcd")
-OTHER = Member("default", "worker", "b-0.1234abcd")
-ANALYZER = Member("default", "analyzer", "a-0.1234abcd")
-COORDINATOR = Member("default", "coordinator", "c.1234abcd")
+WORKER = FleetMember("default", "worker", "a-0.1234abcd")
+OTHER = FleetMember("default", "worker", "b-0.1234abcd")
+ANALYZER = FleetMember("default", "analyzer", "a-0.1234abcd")
+COORDINATOR = FleetMember("default", "coordinator", "c.1234abcd")
 
 
 def may(role: CertificateRole, name: str, flow: str, message: str, key: str) -> bool:
@@ -149,12 +149,14 @@ def test_missing_file_is_not_called_invalid(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("member", "prefix"),
     [
-        (Member("f", "worker", "box-0.1a"), "revolve/f/w/box-0.1a/"),
-        (Member("f", "analyzer", "box"), "revolve/f/an/box/"),
-        (Member("f", "coordinator", "c_1"), "revolve/f/co/c_1/"),
+        (FleetMember("f", "worker", "box-0.1a"), "revolve/f/w/box-0.1a/"),
+        (FleetMember("f", "analyzer", "box"), "revolve/f/an/box/"),
+        (FleetMember("f", "coordinator", "c_1"), "revolve/f/co/c_1/"),
     ],
 )
-def test_all_keys_of_a_process_have_one_prefix(member: Member, prefix: str) -> None:
+def test_all_keys_of_a_process_have_one_prefix(
+    member: FleetMember, prefix: str
+) -> None:
     keys = [member.alive, member.info, member.jobs]
     assert keys == [prefix + "alive", prefix + "info", prefix + "jobs"]
     assert member_of(member.alive) == member
@@ -162,10 +164,10 @@ def test_all_keys_of_a_process_have_one_prefix(member: Member, prefix: str) -> N
 
 def test_tokens_of_one_role_are_found_by_one_expression() -> None:
     expression = zenoh.KeyExpr(key_of_all("f", "worker", "alive"))
-    assert expression.includes(Member("f", "worker", "a.b").alive)
-    assert not expression.intersects(Member("f", "analyzer", "a").alive)
-    assert not expression.intersects(Member("g", "worker", "a").alive)
-    assert not expression.intersects(Member("f", "worker", "a").jobs)
+    assert expression.includes(FleetMember("f", "worker", "a.b").alive)
+    assert not expression.intersects(FleetMember("f", "analyzer", "a").alive)
+    assert not expression.intersects(FleetMember("g", "worker", "a").alive)
+    assert not expression.intersects(FleetMember("f", "worker", "a").jobs)
 
 
 @settings(derandomize=True, deadline=None)

@@ -10,7 +10,7 @@ from schema.agent.address import new_socket
 from schema.agent.network import Agent, hub_config
 from schema.agent.request_handler import ReplyCounts
 from schema.agent.service import Outlet, serve
-from schema.agent.topics import Member
+from schema.agent.topics import FleetMember
 from schema.wire.messages import Failure, Request, Result
 from tests.system.workspace import wait_until
 
@@ -58,7 +58,7 @@ def test_an_agent_says_that_a_coordinator_has_another_version() -> None:
     """The coordinator sends its version when it asks an agent for its properties."""
     stop, lines, address = threading.Event(), list[str](), new_socket()
     agent = Agent("worker", "w", address, version="2")
-    key = Member("default", "worker", "w").info
+    key = FleetMember("default", "worker", "w").info
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))) as hub:
         thread = threading.Thread(
             target=serve, args=(compute, agent, stop), kwargs={"warn": lines.append}

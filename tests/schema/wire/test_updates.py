@@ -14,10 +14,10 @@ from schema.wire.status import IslandStatus, RunStatus, Status
 from schema.wire.updates import (
     ArenaSample,
     Birth,
-    Death,
     Level,
     Migrant,
     Page,
+    RecordedDeath,
     Update,
     WorkerInfo,
     decode_page,
@@ -38,7 +38,7 @@ UPDATE = Update(
         Birth(BirthId(0, 1), (BirthId(0, 0), BirthId(1, 4)), 2, 2, 12.5, CORE),
         Birth(BirthId(1, 4), (), 1, 5, None, CORE),
     ),
-    deaths=(Death(0, BirthId(0, 0), 2, 30.0, "cull"),),
+    deaths=(RecordedDeath(0, BirthId(0, 0), 2, 30.0, "cull"),),
     levels=(Level(0, 2, 2, 1, 0.25, 0.25, (BirthId(0, 0), BirthId(0, 1))),),
     migrants=(
         Migrant(BirthId(0, 1), 0, 1, 9, 30, 60.5),
