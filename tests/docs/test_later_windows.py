@@ -10,7 +10,7 @@ import pytest
 from scipy import stats
 
 from analysis.comparison.claims import CLAIMS
-from docs.studies.thesis.data import DATA
+from docs.studies.thesis.data import DATA, POPULATIONS, WINDOWS
 from docs.studies.thesis.later import dates, key_of
 from docs.studies.thesis.windows import missing
 
@@ -20,9 +20,9 @@ LABELS = {"scenario 1": "scenario1", "scenario 2": "scenario2",
           "no selection": "no-selection"}  # fmt: skip
 
 
-def cells_of(part: str) -> list[list[str]]:
+def cells_of(part: str, page: Path = PAGE) -> list[list[str]]:
     """Return the cells of a generated table, heads first."""
-    found = re.search(f"<!-- begin: {part} -->\n(.*?)<!-- end -->", PAGE.read_text(),
+    found = re.search(f"<!-- begin: {part} -->\n(.*?)<!-- end -->", page.read_text(),
                       re.DOTALL)  # fmt: skip
     assert found
     lines = [line for line in found[1].splitlines() if not line.startswith("|---")]
@@ -37,8 +37,9 @@ def fitness_of(label: str, runs: int = 1000) -> pd.DataFrame:
     return mine.filter(regex=r"^window ").fillna(0.0)
 
 
-def test_all_best_robots_are_evaluated() -> None:
-    assert missing(DATA) == []
+@pytest.mark.parametrize("file", [WINDOWS, POPULATIONS])
+def test_all_robots_are_evaluated(file: Path) -> None:
+    assert missing(DATA, file) == []
 
 
 def test_medians_of_windows_are_recomputed() -> None:
@@ -72,6 +73,24 @@ def test_comparisons_from_36_s_on_are_recomputed_with_scipy() -> None:
         wanted = [a.median(), b.median()]
         found = [float(each) for each in medians.split("; ")]
         assert found == pytest.approx(wanted, abs=6e-4)
+
+
+def test_means_of_populations_are_recomputed_with_scipy() -> None:
+    rows = pd.read_csv(DATA / "windows" / "populations.csv")
+    late = {name: own["late"] for name, own in rows.groupby("experiment")}
+    _, *table = cells_of("populations", PAGE.with_name("starts.md"))
+    assert {cells[0].strip("`") for cells in table} == {*late}
+    for name, runs, median, effect, p in table:
+        own = late[name.strip("`")]
+        assert len(own) == int(runs) == 10
+        assert float(median) == pytest.approx(own.median(), abs=6e-4)
+        if not effect:
+            continue
+        base = late[name.strip("`").partition("-")[0]]
+        test = stats.mannwhitneyu(own, base, method="exact")
+        delta = 2 * test.statistic / len(own) ** 2 - 1
+        assert float(effect.split()[0]) == pytest.approx(delta, abs=0.006)
+        assert float(p) == pytest.approx(test.pvalue, rel=0.06)
 
 
 def test_numbers_of_the_first_who_looked_come_out_again() -> None:

@@ -98,6 +98,8 @@ COURSES = ("late_rise", "early_diversity")
 WINDOWS = Path("windows") / "robots.csv"
 """Fitness of best robots in five windows, which outcomes of later windows follow from:
 all start as in scenario 1."""
+POPULATIONS = Path("windows") / "populations.csv"
+"""Fitness of whole last populations from 36 to 60 s."""
 SLOPE = "extremities_slope"
 """Outcome that is computed from the kept ``extremities``, at the end."""
 _SELECTION = {"warm": (1, 2), "drawn": (None, 3), "reevaluated": (None, 3)}

@@ -1,7 +1,7 @@
 """Generated parts of docs/results.md about later windows, dates of claims and power."""
 
 import csv
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -28,6 +28,7 @@ from docs.studies.thesis.data import (
     BRIDGES,
     DATA,
     PARTS,
+    POPULATIONS,
     WINDOWS,
     rows_of,
     selection_of,
@@ -154,6 +155,27 @@ def bridges() -> list[str]:
         )
     heads = ["experiment", "runs", "median from 36 s on [m/s]",
              "Cliff's delta over scenario 3 (95 %)", "closes the gap"]  # fmt: skip
+    return markdown(heads, rows)
+
+
+def populations() -> list[str]:
+    """Return the mean fitness of last populations from 36 s on, for docs/starts.md."""
+    rows, means = [], defaultdict[str, list[float]](list)
+    for row in csv_rows(DATA / POPULATIONS):
+        means[row["experiment"]].append(float(row["late"]))
+    for name in in_order(means):
+        own, base = np.array(means[name]), np.array(means[name.partition("-")[0]])
+        cells = ["", ""]
+        if name in BRIDGES:
+            delta = cliffs_delta(own, base)
+            low, high = delta_interval(delta, len(own), len(base))
+            cells = [
+                f"{delta:.2f} ({low:.2f}, {high:.2f})",
+                f"{rank_sum_p(own, base):.2g}",
+            ]
+        rows.append([f"`{name}`", str(len(own)), f"{np.median(own):.3f}", *cells])
+    heads = ["experiment", "runs", "median of populations' means [m/s]",
+             "Cliff's delta over the experiment without (95 %)", "p"]  # fmt: skip
     return markdown(heads, rows)
 
 

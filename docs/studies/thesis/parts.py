@@ -13,7 +13,7 @@ from analysis.comparison.statistics import ALPHA, alike_power
 from analysis.figures.style import in_order, label, pair_name
 from docs.studies.pages import Parts, markdown
 from docs.studies.thesis.data import BRIDGES, PARTS
-from docs.studies.thesis.later import bridges, parts_of, topics
+from docs.studies.thesis.later import bridges, parts_of, populations, topics
 
 Tables = Mapping[str, pa.Table]
 Row = dict[str, Any]
@@ -83,7 +83,7 @@ def pages_of(tables: Tables) -> dict[str, Parts]:
             "speed": _speed(tables),
             **parts_of(tables),
         },
-        "starts.md": {"bridges": bridges()},
+        "starts.md": {"bridges": bridges(), "populations": populations()},
         "findings.md": {"power": _power(tables), "all": _all(tables)},
     }
 
