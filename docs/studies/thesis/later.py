@@ -119,17 +119,17 @@ def _late() -> list[str]:
     for a, b in pairs:
         if not {a, b} <= known.keys():
             continue
-        delta = cliffs_delta(known[a], known[b])
-        low, high = delta_interval(delta, len(known[a]), len(known[b]))
-        rows.append(
-            [
-                f"{label(a)}, {label(b)}",
-                f"{np.median(known[a]):.3f}; {np.median(known[b]):.3f}",
-                f"{delta:.2f} ({low:.2f}, {high:.2f})",
-                f"{rank_sum_p(known[a], known[b]):.2g}",
-            ]
-        )
+        medians = f"{np.median(known[a]):.3f}; {np.median(known[b]):.3f}"
+        compared = _compared(known[a], known[b])
+        rows.append([f"{label(a)}, {label(b)}", medians, *compared])
     return markdown(["compared", "medians [m/s]", "Cliff's delta (95 %)", "p"], rows)
+
+
+def _compared(a: Numbers, b: Numbers) -> list[str]:
+    """Return Cliff's delta with its interval, and p, as texts."""
+    delta = cliffs_delta(a, b)
+    low, high = delta_interval(delta, len(a), len(b))
+    return [f"{delta:.2f} ({low:.2f}, {high:.2f})", f"{rank_sum_p(a, b):.2g}"]
 
 
 def bridges() -> list[str]:
@@ -167,15 +167,10 @@ def populations() -> list[str]:
         own, base = np.array(means[name]), np.array(means[name.partition("-")[0]])
         cells = ["", ""]
         if name in BRIDGES:
-            delta = cliffs_delta(own, base)
-            low, high = delta_interval(delta, len(own), len(base))
-            cells = [
-                f"{delta:.2f} ({low:.2f}, {high:.2f})",
-                f"{rank_sum_p(own, base):.2g}",
-            ]
+            cells = _compared(own, base)
         rows.append([f"`{name}`", str(len(own)), f"{np.median(own):.3f}", *cells])
     heads = ["experiment", "runs", "median of populations' means [m/s]",
-             "Cliff's delta over the experiment without (95 %)", "p"]  # fmt: skip
+             "Cliff's delta over scenario 1 or 2 (95 %)", "p"]  # fmt: skip
     return markdown(heads, rows)
 
 
