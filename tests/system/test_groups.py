@@ -65,7 +65,8 @@ def test_two_groups_have_the_births_of_one_coordinator(workspace: Workspace) -> 
     agents = ("--connect", address, "--processes", "1")
     for role in ("analyzer", "worker"):
         workspace.start(role, *agents)
-    wait_until((folders[1] / "journal.bin").exists, "the hub is there")
+    for folder in folders:
+        wait_until((folder / "journal.bin").exists, "the group runs")
     with liar(address):
         kill_beyond(groups[0], folders[0], 0.25 * size(whole))
         reached = size(folders[0])
