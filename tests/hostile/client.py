@@ -330,9 +330,9 @@ def _samples() -> list[bytes]:
 
 
 def _answers(kind: str) -> list[bytes]:
-    """Return answers to no job, descriptions of nobody, or replies to nobody."""
+    """Return answers to no job, an unknown agent's description, or unasked replies."""
     if kind == "info":
-        return [_info(FleetMember("default", "worker", "nobody"))]
+        return [_info(FleetMember("default", "worker", "unknown"))]
     if kind in ("command", "state"):
         return [encode(update())]
     results = (Evaluation(99.0, 0.0, 0.0, 1.0), Failure("diverged"), StateMissing())

@@ -67,7 +67,7 @@ def _wait_for_viewer(address: str) -> None:
     """Wait until a viewer subscribes to the news of coordinators."""
     config = zenoh.Config.from_json5(client_config(address))
     with zenoh.open(config) as session:
-        key = FleetMember("default", "coordinator", "nobody").events
+        key = FleetMember("default", "coordinator", "unknown").events
         publisher = session.declare_publisher(key)
         # Zenoh's stubs call the status a bool; it is an object that is always true.
         status: Callable[[], Any] = lambda: publisher.matching_status  # noqa: E731
