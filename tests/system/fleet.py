@@ -35,7 +35,8 @@ def kill_beyond(process: Process, folder: Path, position: float) -> None:
         "the run is on its way",
     )
     process.kill()
-    process.communicate()
+    output = process.communicate()
+    assert size(folder) > position, output
 
 
 def advances(folder: Path) -> list[Advanced]:

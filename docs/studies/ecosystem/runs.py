@@ -13,6 +13,7 @@ that are expected to be short come first; two are made side by side.
 
 import argparse
 import shutil
+import signal
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -192,6 +193,9 @@ def main() -> None:
         return
     if options.folder is None:
         parser.error("FOLDER: needed to make runs")
+    # Ctrl-C ends this process without a wait for its threads. The processes of the runs
+    # end with it; the next time they are resumed.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     with ThreadPoolExecutor(AT_ONCE) as pool:
         for _ in pool.map(lambda own: make(own, options.folder), runs):
             pass
