@@ -46,8 +46,8 @@ from schema.plugins.permission import allow
 _RETRY_S = 0.3
 # Between two messages to this process itself, and two looks why a hub refuses it.
 _BETWEEN_S, _TELL_AGAIN_S = 0.02, 10.0
-# Different lines about refused runs that are written.
-_MOST_REFUSALS = 20
+_MOST_REFUSALS = 20  # Lines about refused runs.
+_OPENING = threading.Lock()  # All threads have one environment.
 
 GAVE_UP = 75
 """Exit status of a process that gave up for lack of a hub (EX_TEMPFAIL)."""
@@ -77,15 +77,16 @@ def open_session(config: zenoh.Config, *, is_agent: bool = False) -> zenoh.Sessi
         zenoh.ZError: no hub answers, or an address cannot be listened on.
     """
     names = ("RUST_LOG", "ZENOH_RUNTIME")
-    chosen = {name: os.environ.pop(name) for name in names if name in os.environ}
-    # Read when a process opens its first session.
-    os.environ["ZENOH_RUNTIME"] = AGENT_THREADS if is_agent else HUB_THREADS
-    try:
-        zenoh.init_log_from_env_or(_ENGINE_LOG)
-        return zenoh.open(config)
-    finally:
-        del os.environ["ZENOH_RUNTIME"]
-        os.environ.update(chosen)
+    with _OPENING:
+        chosen = {name: os.environ.pop(name) for name in names if name in os.environ}
+        # Read when a process opens its first session.
+        os.environ["ZENOH_RUNTIME"] = AGENT_THREADS if is_agent else HUB_THREADS
+        try:
+            zenoh.init_log_from_env_or(_ENGINE_LOG)
+            return zenoh.open(config)
+        finally:
+            del os.environ["ZENOH_RUNTIME"]
+            os.environ.update(chosen)
 
 
 def session_config(text: str, member: FleetMember) -> zenoh.Config:
@@ -157,8 +158,7 @@ class HubWatch:
                 self.say(f"connected to {self.address}")
         if there:
             if self._lost_s is not None:
-                again = "re" if self._hubs else ""
-                self.say(f"{again}connected to {self.address}")
+                self.say(f"{'re' * bool(self._hubs)}connected to {self.address}")
             is_new = self._lost_s is not None or not self._hubs
             self._lost_s, self._hubs, self._told = None, there, ""
             return is_new

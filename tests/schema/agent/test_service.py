@@ -1,6 +1,8 @@
-"""What an agent does at its end."""
+"""How an agent opens its session, and what it does at its end."""
 
+import os
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import zenoh
@@ -93,3 +95,21 @@ def test_a_reply_after_the_time_of_its_query_is_not_told(
         with late.pop() as query:
             query.reply("slow", b"late")
     assert capfd.readouterr() == ("", "")
+
+
+def test_threads_that_open_sessions_at_once_leave_the_environment(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each of them changes it for the engine meanwhile."""
+    monkeypatch.setenv("RUST_LOG", "off")
+    monkeypatch.delenv("ZENOH_RUNTIME", raising=False)
+    configs = [hub_config((new_socket(),)) for _ in range(8)]
+
+    def opened(config: str) -> bool:
+        with service.open_session(zenoh.Config.from_json5(config)) as session:
+            return not session.is_closed()
+
+    with ThreadPoolExecutor(len(configs)) as threads:
+        assert [*threads.map(opened, configs)] == [True] * len(configs)
+    assert os.environ.get("RUST_LOG") == "off"
+    assert "ZENOH_RUNTIME" not in os.environ
