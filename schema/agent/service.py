@@ -46,8 +46,8 @@ from schema.plugins.permission import allow
 _RETRY_S = 0.3
 # Between two messages to this process itself, and two looks why a hub refuses it.
 _BETWEEN_S, _TELL_AGAIN_S = 0.02, 10.0
-_MOST_REFUSALS = 20  # Lines about refused runs.
-_OPENING = threading.Lock()  # All threads have one environment.
+_MOST_REFUSALS = 20  # Different lines about refused runs that are written.
+_OPENING = threading.Lock()  # One at a time: threads share the environment.
 
 GAVE_UP = 75
 """Exit status of a process that gave up for lack of a hub (EX_TEMPFAIL)."""
@@ -158,7 +158,7 @@ class HubWatch:
                 self.say(f"connected to {self.address}")
         if there:
             if self._lost_s is not None:
-                self.say(f"{'re' * bool(self._hubs)}connected to {self.address}")
+                self.say(f"{'re' if self._hubs else ''}connected to {self.address}")
             is_new = self._lost_s is not None or not self._hubs
             self._lost_s, self._hubs, self._told = None, there, ""
             return is_new
