@@ -5,8 +5,9 @@ one worker.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
+
+from msgspec import Struct
 
 from schema.wire.messages import Crash
 
@@ -29,8 +30,7 @@ class Client(NamedTuple):
 NO_CLIENT = Client("", 0)
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
+class Job(Struct, frozen=True):
     """One piece of work, a pure function of its request.
 
     Attributes:
@@ -56,16 +56,13 @@ class Job:
     paired: int = -1
     client: Client = NO_CLIENT
     subject: object = None
-    read: Read = field(default=bytes, compare=False)
+    read: Read = bytes
     simulated_s: float | None = None
     shard: int = -1
-    sent: dict[tuple[int, str], tuple[bytes, Read]] = field(
-        default_factory=dict, compare=False, repr=False
-    )
+    sent: dict[tuple[int, str], tuple[bytes, Read]] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class Joined:
+class Joined(Struct, frozen=True):
     """A worker or an analyzer is ready for jobs.
 
     Attributes:
@@ -83,29 +80,25 @@ class Joined:
     cores: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Left:
+class Left(Struct, frozen=True):
     """A worker or an analyzer is gone; the jobs that it held are lost."""
 
     agent: str
 
 
-@dataclass(frozen=True, slots=True)
-class Requested:
+class Requested(Struct, frozen=True):
     """A client wants a job done."""
 
     job: Job
 
 
-@dataclass(frozen=True, slots=True)
-class Withdrawn:
+class Withdrawn(Struct, frozen=True):
     """A job is no longer wanted; it may be done already."""
 
     number: int
 
 
-@dataclass(frozen=True, slots=True)
-class ClientEnded:
+class ClientEnded(Struct, frozen=True):
     """A client has ended: none of its jobs is wanted any more."""
 
     client: Client
@@ -130,8 +123,7 @@ waits for one; the agent knows a later coordinator of the run; it was cancelled;
 request could not be made."""
 
 
-@dataclass(frozen=True, slots=True)
-class Returned:
+class Returned(Struct, frozen=True):
     """A job came back from an agent.
 
     Attributes:
@@ -149,8 +141,7 @@ class Returned:
     took_s: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Expired:
+class Expired(Struct, frozen=True):
     """The network waited too long for the reply to a job or an advance.
 
     It is sent again to its agent.
@@ -160,22 +151,19 @@ class Expired:
     agent: str
 
 
-@dataclass(frozen=True, slots=True)
-class Ticked:
+class Ticked(Struct, frozen=True):
     """Time passed: the time now, of a monotonic clock [s]."""
 
     now_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Progressed:
+class Progressed(Struct, frozen=True):
     """An agent that was asked reports that its current job uses CPU time."""
 
     agent: str
 
 
-@dataclass(frozen=True, slots=True)
-class ShardSeen:
+class ShardSeen(Struct, frozen=True):
     """A shard was advanced on a platform, according to the journal.
 
     Attributes:
@@ -190,8 +178,7 @@ class ShardSeen:
     client: Client = NO_CLIENT
 
 
-@dataclass(frozen=True, slots=True)
-class Released:
+class Released(Struct, frozen=True):
     """A shard needs no more advances; its holder is free for another one."""
 
     shard: int
@@ -213,8 +200,7 @@ DispatchEvent = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Assign:
+class Assign(Struct, frozen=True):
     """Send a job to an agent.
 
     Attributes:
@@ -229,8 +215,7 @@ class Assign:
     is_whole: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Deliver:
+class Deliver(Struct, frozen=True):
     """A job is done, or given up for a reason.
 
     Attributes:
@@ -249,23 +234,20 @@ class Deliver:
     is_deadly: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Cancel:
+class Cancel(Struct, frozen=True):
     """The agent's work on a job is no longer needed."""
 
     job: Job
     agent: str
 
 
-@dataclass(frozen=True, slots=True)
-class AskProgress:
+class AskProgress(Struct, frozen=True):
     """Ask an agent whether it works: one of its jobs is past its deadline."""
 
     agent: str
 
 
-@dataclass(frozen=True, slots=True)
-class Overdue:
+class Overdue(Struct, frozen=True):
     """Tell the user that an agent neither answers nor reports progress.
 
     Attributes:
@@ -278,8 +260,7 @@ class Overdue:
     to: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Crowded:
+class Crowded(Struct, frozen=True):
     """Tell the user that there are more shards than states that all workers keep."""
 
     shards: int

@@ -6,9 +6,11 @@ An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
+
+from msgspec.structs import replace
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (

@@ -105,8 +105,8 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
             nonce = read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
             self.epoch = _next_epoch(path)
-            self._epoch_file, self._mark = path / EPOCH, str(self.epoch).encode()
-            replace_bytes(self._epoch_file, self._mark)
+            self._epoch_file, self._mark = str(path / EPOCH), str(self.epoch).encode()
+            replace_bytes(path / EPOCH, self._mark)
         except BaseException:
             self.close()
             raise
@@ -133,12 +133,14 @@ class RunFolder(contextlib.AbstractContextManager["RunFolder"]):
                 file with the epoch is damaged.
         """
         # For each answer of an agent: a plain comparison suffices nearly always.
-        with (
-            contextlib.suppress(OSError),
-            open(self._epoch_file, "rb", 0, opener=_now) as file,
-        ):
-            if file.read(MOST_MARK) == self._mark:
-                return
+        with contextlib.suppress(OSError):
+            # A named pipe must not block.
+            file = os.open(self._epoch_file, os.O_RDONLY | os.O_NONBLOCK)
+            try:
+                if os.read(file, MOST_MARK) == self._mark:
+                    return
+            finally:
+                os.close(file)
         try:
             epoch = _read_epoch(self.path)
         except RunFolderError as error:
@@ -310,11 +312,6 @@ def _next_epoch(path: Path) -> int:
             "number: copy its experiment and start another run"
         )
     return epoch
-
-
-def _now(path: str, flags: int) -> int:
-    """Open a file; a named pipe must not block."""
-    return os.open(path, flags | os.O_NONBLOCK)
 
 
 def _read_epoch(path: Path) -> int:

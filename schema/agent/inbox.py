@@ -52,6 +52,8 @@ class Inbox(Generic[T]):
         return self._items.get_nowait()
 
 
+TURN_S = 0.005
+"""Time by which a source that is served may be ahead of the others [s]."""
 MOST_SOURCES = 1000
 """Most accounts that are kept of sources without waiting items."""
 
@@ -60,8 +62,9 @@ class FairQueue(Generic[T]):
     """Waiting items of several sources, each of which gets the same share of time.
 
     Each source has an account of the time that it was served. The waiting source with
-    the least time is next; its own items come in order of arrival. A source that comes
-    back continues at the level of the others: it cannot save up unused time.
+    the least time is next, once the last one has ``TURN_S`` more; its own items come in
+    order of arrival. A source that comes back continues at the level of the others: it
+    cannot save up unused time.
     Beyond a limit the newest items of the source with the most bytes are dropped.
     Source: start-time fair queueing (Goyal, Vin and Cheng 1996), with served time for
     packet lengths.
@@ -112,7 +115,12 @@ class FairQueue(Generic[T]):
         if not self._waiting:
             raise IndexError("the queue is empty")
         source = min(self._waiting, key=self._accounts.__getitem__)
-        self._served, self._level_s = source, self._accounts[source]
+        self._level_s = self._accounts[source]
+        # Replies to one source travel together.
+        if self._served in self._waiting:
+            ahead_s = self._accounts[self._served] - self._level_s
+            source = self._served if ahead_s < TURN_S else source
+        self._served = source
         queue = self._waiting[source]
         item, cost = queue.popleft()
         self._count(source, -cost)

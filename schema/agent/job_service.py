@@ -21,8 +21,8 @@ _POLL_S = 0.2
 # Queries that are taken before a job is done.
 _MOST_QUERIES = 1000
 
-QUICK_S = 0.001
-"""Duration of jobs whose replies wait for others [s]."""
+KEEP_S = 0.005
+"""Duration of the jobs whose replies travel together [s]."""
 
 
 class Bundle:
@@ -37,6 +37,7 @@ class Bundle:
         self._query, self._jobs = query, jobs
         self._lock = threading.Lock()
         self._replies: list[Reply] = []
+        self._kept_s = 0.0
         self.requests: list[bytes] = []
         payload = query.payload
         try:
@@ -52,8 +53,10 @@ class Bundle:
         with self._lock:
             self._replies.append(reply)
         self._open -= 1
-        if took_s >= QUICK_S or not self._open:
+        self._kept_s += took_s
+        if self._kept_s >= KEEP_S or not self._open:
             self.send()
+            self._kept_s = 0.0
         if not self._open:
             self._drop_query()
 

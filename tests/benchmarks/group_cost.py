@@ -9,6 +9,7 @@ for their progress, and prints how often each group worked, or waited for migran
 
 import argparse
 import os
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -61,7 +62,9 @@ def run(place: Path, births: int, groups: int) -> tuple[float, list[str]]:
         agent = Agent("worker", "null", address)
         judge = Agent("analyzer", "judge", address)
         coordinators = [
-            workspace.start(
+            # New interpreters, as only a child's CPU time can be waited for.
+            workspace.start_command(
+                *(sys.executable, "-m", "revolve"),
                 *("coordinator", "ring.toml", "--seed", "1", "--quiet"),
                 *("--group", f"{number}/{groups}", "--out", f"all/group-{number}"),
                 *("--connect", address, "--give-up-after", "60"),

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import count, pairwise
 from random import Random
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coordinator.dispatch.assignment import BIRTHS_AT_HAND, CALL_S, COPY_GROWTH, LEAST_S
 from coordinator.dispatch.dispatch import MAX_DEATHS, MAX_ERRORS, Dispatch

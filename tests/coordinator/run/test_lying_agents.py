@@ -3,7 +3,6 @@
 Everything but the physics is real: machines, fleet, loop, journal and tables.
 """
 
-import dataclasses
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
@@ -71,7 +70,7 @@ def with_liar(kind: AgentKind, lie: Lie) -> type[LocalAgents]:
                 return event
             told = lie(decode(Answer, event.answer, ADVANCE_BYTES))
             data = told if isinstance(told, bytes) else encode(told)
-            return dataclasses.replace(event, answer=data)
+            return replace(event, answer=data)
 
     return Liars
 

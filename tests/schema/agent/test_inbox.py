@@ -8,7 +8,7 @@ from queue import Empty
 
 import pytest
 
-from schema.agent.inbox import MOST_SOURCES, FairQueue, Inbox
+from schema.agent.inbox import MOST_SOURCES, TURN_S, FairQueue, Inbox
 from schema.limits import WAITING_JOB_BYTES
 
 
@@ -137,6 +137,18 @@ def test_jobs_of_equal_length_take_turns() -> None:
         order.append(turns.take())
         turns.spent(1.0)
     assert order == [b"a1", b"b1", b"c1", b"a2", b"b2", b"a3"]
+
+
+def test_quick_jobs_of_a_source_are_done_one_after_the_other() -> None:
+    turns: FairQueue[bytes] = FairQueue()
+    for _ in range(4):
+        turns.put(b"a", b"a")
+        turns.put(b"b", b"b")
+    order = b""
+    while turns:
+        order += turns.take()
+        turns.spent(0.5 * TURN_S)
+    assert order == b"aabbbbaa"
 
 
 def test_absent_source_saves_up_no_time() -> None:
