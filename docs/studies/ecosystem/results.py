@@ -28,6 +28,7 @@ from docs.studies.ecosystem.runs import (
     INTAKES,
     ROBOTS,
     RUNS,
+    missing,
     planned,
 )
 from docs.studies.pages import PICTURES, Parts, command, csv_rows, markdown
@@ -282,7 +283,7 @@ def pages() -> dict[str, Parts]:
     """Return the generated parts of the page."""
     runs = frame(RUNS)
     wanted = len([*planned()])
-    made = int((runs["part"] != "neutral").sum())
+    made = wanted - len(missing(None))
     return {
         "ecosystem.md": {
             "study runs": [f"{made} of {wanted} runs are made."],
