@@ -15,6 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from msgspec.structs import replace
+
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import JobWatch, ProcessSlot, thread_clock
 from schema.errors import (
@@ -25,6 +27,7 @@ from schema.errors import (
     error_text,
 )
 from schema.limits import (
+    ADVANCE_BYTES,
     ADVANCE_REQUEST_BYTES,
     LONGEST_REASON,
     REQUEST_BYTES,
@@ -33,7 +36,15 @@ from schema.limits import (
 from schema.plugins.source import check_plugins
 from schema.wire.arena import AdvanceShard
 from schema.wire.codec import decode, encode, fingerprint
-from schema.wire.messages import AgentInfo, Answer, Reply, Request, Result, RunningJob
+from schema.wire.messages import (
+    AgentInfo,
+    Answer,
+    Reply,
+    Request,
+    Result,
+    RunningJob,
+    StateMissing,
+)
 
 _MOST_REMEMBERED = 1000
 LONG_S = 60.0
@@ -99,7 +110,7 @@ class Server:
     _cancelled: dict[bytes, None] = field(default_factory=dict)
     _skipped: dict[bytes, None] = field(default_factory=dict)
     _answers: dict[RunningJob, bytes] = field(default_factory=dict)
-    _advances: dict[tuple[str, int], tuple[RunningJob, bytes]] = field(
+    _advances: dict[tuple[str, int], tuple[Request, bytes]] = field(
         default_factory=dict
     )
 
@@ -160,8 +171,8 @@ class Server:
             self.watch.end()
         self.counts.answered += 1
         if isinstance(request.work, AdvanceShard):
-            arena = (request.run, request.work.island)
-            _remember(arena, (task, answered), self._advances, self.agent.shards)
+            arena, last = (request.run, request.work.island), _repeatable(request)
+            _remember(arena, (last, answered), self._advances, self.agent.shards)
         elif time.monotonic() - began_s >= LONG_S:
             _remember(task, answered, self._answers, _MOST_LONG)
         return Reply(place, answered)
@@ -169,8 +180,15 @@ class Server:
     def _known(self, task: RunningJob, request: Request) -> bytes | None:
         if not isinstance(request.work, AdvanceShard):
             return self._answers.get(task)
-        last = self._advances.get((request.run, request.work.island))
-        return last[1] if last and last[0] == task else None
+        last, answered = self._advances.get(
+            (request.run, request.work.island), (None, b"")
+        )
+        if last != _repeatable(request):
+            return None
+        known = decode(Answer, answered, ADVANCE_BYTES)
+        if isinstance(known.result, StateMissing):
+            return None
+        return encode(replace(known, number=request.number))
 
     def look(self) -> None:
         """End this process if its job waits for too long; call it regularly.
@@ -199,6 +217,18 @@ class Server:
                 f"epoch {newest} has begun"
             )
         check_plugins(request.plugins, request.run)
+
+
+def _repeatable(request: Request) -> Request:
+    """Return the request of an advance without what changes if it is assigned again.
+
+    That is its number, and whether the state comes with it.
+    """
+    work = request.work
+    assert isinstance(work, AdvanceShard)
+    if work.rebuild and work.rebuild.living is None:
+        work = replace(work, rebuild=None)
+    return replace(request, number=0, work=work)
 
 
 def _remember(

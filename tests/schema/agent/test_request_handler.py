@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import LONG_S, Compute, Server
@@ -24,7 +25,7 @@ from schema.plugins.source import check_plugins, plugins_of
 from schema.robot.ids import NOBODY
 from schema.robot.results import Evaluation
 from schema.robot.robot import Part, Robot
-from schema.wire.arena import AdvanceShard, Changes
+from schema.wire.arena import AdvanceShard, Changes, Rebuild
 from schema.wire.codec import decode, encode, fingerprint
 from schema.wire.messages import (
     AgentInfo,
@@ -36,6 +37,7 @@ from schema.wire.messages import (
     Request,
     Result,
     RunningJob,
+    StateMissing,
     Work,
 )
 
@@ -55,7 +57,8 @@ def request(
 
 
 def advance(number: int, island: int = 0, *, run: str = "r") -> bytes:
-    return request(number, run=run, work=AdvanceShard(island, 0, 9, Changes(), False))
+    work = AdvanceShard(island, 0, 10 * number, Changes(), False)
+    return request(number, run=run, work=work)
 
 
 def server(compute: Compute = lambda _: ANSWER, shards: int = 1) -> Server:
@@ -123,15 +126,53 @@ def test_the_last_advance_of_each_arena_is_answered_from_memory() -> None:
     assert asked == [1, 2, 3, 4, 1, 5, 2]
 
 
+ADVANCE = AdvanceShard(0, 0, 9, Changes(), False)
+REBUILD = Rebuild(b"snapshot", ())
+
+
+@pytest.mark.parametrize("work", [ADVANCE, replace(ADVANCE, rebuild=REBUILD)])
+def test_an_advance_that_is_assigned_again_is_answered_from_memory(work: Work) -> None:
+    """Its worker was lost for a moment, and may have several requests by now."""
+    compute, asked = counting()
+    made = server(compute)
+    first = made.reply(request(1, work=ADVANCE))
+    for number in (2, 3):
+        reply = made.reply(request(number, work=work))
+        assert result(reply) == result(first)
+        assert decode(Answer, reply.answer, ANSWER_BYTES).number == number
+    assert asked == [1]
+
+
+def test_an_advance_without_its_state_is_done_when_the_state_comes() -> None:
+    given: list[object] = []
+
+    def compute(wanted: Request) -> Result:
+        assert isinstance(wanted.work, AdvanceShard)
+        given.append(wanted.work.rebuild)
+        return Failure("done") if wanted.work.rebuild else StateMissing()
+
+    made = server(compute)
+    assert result(made.reply(request(1, work=ADVANCE))) == StateMissing()
+    whole = replace(ADVANCE, rebuild=REBUILD)
+    assert result(made.reply(request(2, work=whole))) == Failure("done")
+    assert given == [None, REBUILD]
+
+
 @pytest.mark.parametrize(
-    "other", [{"epoch": 2}, {"number": 2}, {"run": "s"}, {"plugins": " "}]
+    "other",
+    [
+        {"epoch": 2},
+        {"run": "s"},
+        {"plugins": " "},
+        {"work": replace(ADVANCE, wants_snapshot=True)},
+        {"work": replace(ADVANCE, rebuild=replace(REBUILD, living=()))},
+    ],
 )
 def test_another_request_is_not_answered_from_memory(other: dict[str, Any]) -> None:
     compute, asked = counting()
     made = server(compute, shards=9)
-    work = AdvanceShard(0, 0, 9, Changes(), False)
-    made.reply(request(work=work))
-    made.reply(request(**{"work": work, **other}))
+    made.reply(request(work=ADVANCE))
+    made.reply(request(**{"work": ADVANCE, **other}))
     assert len(asked) == 2
 
 
