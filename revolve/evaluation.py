@@ -1,6 +1,5 @@
 """Simulation and evaluation of single robots."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -152,7 +151,7 @@ def settings_for(
 def outside_of_runs(trial: object) -> Identity:
     """Return the identity of an evaluation of a robot that was born in no run."""
     number = whole_number("trial", trial, most=MOST_TRIAL)
-    return dataclasses.replace(NO_IDENTITY, trial=number)
+    return replace(NO_IDENTITY, trial=number)
 
 
 def result_of(

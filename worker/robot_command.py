@@ -1,6 +1,5 @@
 """``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
-import dataclasses
 from functools import partial
 from pathlib import Path
 
@@ -58,7 +57,7 @@ def _evaluate(robot: Robot, settings: EvaluationSettings, trial: int) -> Evaluat
         return evaluate(
             robot,
             settings,
-            dataclasses.replace(NO_IDENTITY, trial=trial),
+            replace(NO_IDENTITY, trial=trial),
             watch=lambda data: tell_progress(f"simulated {data.time:.1f} of {all_s}"),
         )
 

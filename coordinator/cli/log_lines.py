@@ -1,9 +1,9 @@
 """Events of a journal as fields, and as aligned lines of text."""
 
 import re
-from dataclasses import dataclass
 from typing import Any
 
+from msgspec import Struct
 from msgspec.structs import asdict
 
 from coordinator.islands.events import (
@@ -60,8 +60,7 @@ _DETAILS = {
 Fields = dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class EventFilter:
+class EventFilter(Struct, frozen=True):
     """Events to print; None selects all. ``origin`` is the island of the birth."""
 
     island: int | None = None

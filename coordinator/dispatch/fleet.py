@@ -6,10 +6,10 @@ An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coordinator.dispatch.dispatch import Dispatch
@@ -69,8 +69,7 @@ It raises ``RunFolderError`` if a state that the request needs cannot be read.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Fenced:
+class Fenced(Struct, frozen=True):
     """An agent refused a client's job as that of a replaced coordinator."""
 
     client: Client

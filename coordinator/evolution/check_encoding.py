@@ -1,11 +1,11 @@
 """Check of an encoding, and of the genes of a brain type, before the first birth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import cast
 
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coordinator.evolution.brains import brain_genes
@@ -52,8 +52,7 @@ def check_encoding(experiment: Experiment, look: Look = lambda *_: None) -> None
         raise broken("", "make a child of some couple", came=came)
 
 
-@dataclass(frozen=True, slots=True)
-class _Case:
+class _Case(Struct, frozen=True):
     """An encoding, and what its methods must return."""
 
     encoding: IslandEncoding

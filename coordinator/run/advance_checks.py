@@ -7,9 +7,9 @@ request; so no state machine raises for it. A plausible number that is wrong pas
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from itertools import pairwise
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coordinator.run.requests import check_count, impossible
@@ -25,8 +25,7 @@ _SHOWN = 3
 """Robots that a message names."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExpectedAdvance:
+class ExpectedAdvance(Struct, frozen=True):
     """What a correct result of an advance has.
 
     Attributes:

@@ -1,10 +1,9 @@
 """What all requests of a run have in common."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Self
 
-from msgspec import structs
+from msgspec import Struct, structs
 
 from coordinator.dispatch.events import Client
 from schema.experiment.document import Experiment, body_space, island_experiments
@@ -22,8 +21,7 @@ from schema.wire.codec import encode
 from schema.wire.messages import Request
 
 
-@dataclass(frozen=True, slots=True)
-class RunContext:
+class RunContext(Struct, frozen=True):
     """What every request of a run carries beside the robot or the changes.
 
     Attributes:

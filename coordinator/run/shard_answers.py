@@ -1,10 +1,9 @@
 """Decoded answers of workers that advance arenas, checked against their requests."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
-from msgspec import structs
+from msgspec import Struct, structs
 
 from coordinator.islands.events import Advanced
 from coordinator.parts.exchange import PartResult
@@ -30,8 +29,7 @@ _ROUNDING_M = 1e-3
 """Poses are of less precision than boxes [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Reached:
+class Reached(Struct, frozen=True):
     """A decoded answer to a request to advance a shard.
 
     Attributes:
@@ -42,8 +40,7 @@ class Reached:
     snapshot: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class PartReached:
+class PartReached(Struct, frozen=True):
     """A decoded answer to a request to advance a part of an arena."""
 
     result: PartResult

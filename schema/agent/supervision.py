@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import Array, c_char
-from dataclasses import dataclass
 from multiprocessing import get_context, heap
 
 import msgspec
@@ -99,8 +98,7 @@ def crash_cause(exit_code: int) -> str:
     return signal.Signals(number).name if number in _OWN_DOING else ""
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessSlot:
+class ProcessSlot(msgspec.Struct, frozen=True):
     """A process's slot in a pool.
 
     Attributes:

@@ -19,11 +19,13 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.process import BaseProcess
 from typing import Any, Self
+
+from msgspec.structs import replace
 
 from schema.agent.import_path import SAFE_PATH, check_graphics
 from schema.agent.log import warn_user

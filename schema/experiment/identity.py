@@ -1,7 +1,6 @@
 """Identity of an evaluation, which determines its draws; group of an archipelago."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -24,8 +23,7 @@ class Origin(Section, frozen=True):
     island: Count = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Identity:
+class Identity(Struct, frozen=True):
     """Identity of an evaluation.
 
     Attributes:

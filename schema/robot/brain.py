@@ -11,7 +11,6 @@ states; from the code of the original):
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -43,8 +42,7 @@ INPUT = "Input"
 _SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
 
 
-@dataclass(frozen=True, slots=True)
-class Widths:
+class Widths(Struct, frozen=True):
     """Greatest numbers of input, output and hidden neurons in an experiment."""
 
     inputs: int

@@ -7,13 +7,13 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from msgspec import Struct
 from msgspec.structs import replace
 
 from schema.agent.flags import add_count, whole_number
@@ -51,8 +51,7 @@ RESULTS = pa.schema(
 Row = dict[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class RobotSource:
+class RobotSource(Struct, frozen=True):
     """Random robots, from the generator and the analyzer of the other rooms."""
 
     generate: Callable[[np.random.Generator, Experiment, BirthId], Genome]

@@ -8,13 +8,13 @@ distance of two robots.
 import math
 from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from msgspec import Struct
 from msgspec.structs import replace
 
 from schema.experiment.document import body_space
@@ -44,8 +44,7 @@ _Sphere = tuple[Floats, float]
 """Centre and radius [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class BoundingSpheres:
+class BoundingSpheres(Struct, frozen=True):
     """Bounds of one robot that hold at any joint angle.
 
     Attributes:
@@ -66,8 +65,7 @@ class BoundingSpheres:
     weights: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Body:
+class Body(Struct, frozen=True):
     """Engine models of one robot.
 
     Attributes:

@@ -6,9 +6,9 @@ world differ.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from schema.errors import FAILURES
@@ -44,8 +44,7 @@ BUMP_M = 0.002
 SLOPE_DEG = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class ChangedSettings:
+class ChangedSettings(Struct, frozen=True):
     """Settings with one change; ``is_small``: by less than two real machines differ."""
 
     name: str

@@ -1,7 +1,5 @@
 """The work of requests of all kinds, and calls of users' own functions."""
 
-from dataclasses import dataclass
-
 import msgspec
 
 from schema.errors import FAILURES, ExperimentError, MalformedMessage, error_text
@@ -29,8 +27,7 @@ from worker.robot.evaluation import evaluate, evaluate_traced
 from worker.serve.shards import Shards
 
 
-@dataclass(frozen=True, slots=True)
-class Jobs:
+class Jobs(msgspec.Struct, frozen=True):
     """Evaluations and arena shards of one worker process."""
 
     shards: Shards
