@@ -1,10 +1,9 @@
 """Jobs, advances and agents at present, and which agent gets which job."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from heapq import heappop
 from itertools import count
-
-from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
     AgentKind,

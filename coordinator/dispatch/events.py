@@ -5,6 +5,7 @@ one worker.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
 from msgspec import Struct
@@ -30,7 +31,8 @@ class Client(NamedTuple):
 NO_CLIENT = Client("", 0)
 
 
-class Job(Struct, frozen=True):
+@dataclass(frozen=True, slots=True)
+class Job:
     """One piece of work, a pure function of its request.
 
     Attributes:
@@ -56,10 +58,12 @@ class Job(Struct, frozen=True):
     paired: int = -1
     client: Client = NO_CLIENT
     subject: object = None
-    read: Read = bytes
+    read: Read = field(default=bytes, compare=False)
     simulated_s: float | None = None
     shard: int = -1
-    sent: dict[tuple[int, str], tuple[bytes, Read]] = {}
+    sent: dict[tuple[int, str], tuple[bytes, Read]] = field(
+        default_factory=dict, compare=False, repr=False
+    )
 
 
 class Joined(Struct, frozen=True):

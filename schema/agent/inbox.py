@@ -53,7 +53,7 @@ class Inbox(Generic[T]):
 
 
 TURN_S = 0.005
-"""Time by which a source that is served may be ahead of the others [s]."""
+"""Time by which a source may be ahead of others; replies wait as long [s]."""
 MOST_SOURCES = 1000
 """Most accounts that are kept of sources without waiting items."""
 

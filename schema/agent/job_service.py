@@ -10,7 +10,7 @@ from queue import Empty
 
 import zenoh
 
-from schema.agent.inbox import FairQueue, Inbox
+from schema.agent.inbox import TURN_S, FairQueue, Inbox
 from schema.agent.request_handler import ReplyCounts, Server
 from schema.errors import MalformedMessage
 from schema.limits import BUNDLE_BYTES, MOST_SHOWN
@@ -20,9 +20,6 @@ from schema.wire.messages import Jobs, Reply
 _POLL_S = 0.2
 # Queries that are taken before a job is done.
 _MOST_QUERIES = 1000
-
-KEEP_S = 0.005
-"""Duration of the jobs whose replies travel together [s]."""
 
 
 class Bundle:
@@ -52,18 +49,17 @@ class Bundle:
         """Send a reply, or keep it for a moment if the job was quick [s]."""
         with self._lock:
             self._replies.append(reply)
+            self._kept_s += took_s
         self._open -= 1
-        self._kept_s += took_s
-        if self._kept_s >= KEEP_S or not self._open:
+        if self._kept_s >= TURN_S or not self._open:
             self.send()
-            self._kept_s = 0.0
         if not self._open:
             self._drop_query()
 
     def send(self) -> None:
         """Send the replies that are kept; from any thread."""
         with self._lock:
-            replies, self._replies = self._replies, []
+            replies, self._replies, self._kept_s = self._replies, [], 0.0
             if replies:
                 self._query.reply(self._jobs, encode(replies))
 

@@ -1,5 +1,6 @@
 """Dispatch: each job is done once, whatever happens to its agents."""
 
+import dataclasses
 import time
 from collections.abc import Callable
 from itertools import count, pairwise
@@ -213,7 +214,7 @@ class Single:
 
     @property
     def job(self) -> Job:
-        return replace(self._job, number=self.assigned[-1][0])
+        return dataclasses.replace(self._job, number=self.assigned[-1][0])
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
         commands = self.dispatch.handle(event)
@@ -439,7 +440,7 @@ def simulation(number: int, simulated_s: float = 12.0, paired: int = -1) -> Job:
 
 
 def vetting(number: int) -> Job:
-    return replace(job(number, "breed"), simulated_s=0.0)
+    return dataclasses.replace(job(number, "breed"), simulated_s=0.0)
 
 
 class Silence:
@@ -778,7 +779,9 @@ class World:
     def request(self) -> None:
         number = next(self.numbers)
         kind: JobKind = self.random.choice(("breed", "evaluate"))
-        made = replace(job(number, kind), simulated_s=self.random.choice((None, 1.0)))
+        made = dataclasses.replace(
+            job(number, kind), simulated_s=self.random.choice((None, 1.0))
+        )
         self.jobs[number] = made
         self.tell(Requested(self.jobs[number]))
 

@@ -4,8 +4,8 @@ from typing import Any
 
 import pytest
 
-from schema.agent.inbox import Inbox
-from schema.agent.job_service import KEEP_S, WaitingJobs
+from schema.agent.inbox import TURN_S, Inbox
+from schema.agent.job_service import WaitingJobs
 from schema.agent.network import Agent
 from schema.agent.request_handler import ReplyCounts, Server
 from schema.limits import BUNDLE_BYTES, MOST_BUNDLED
@@ -88,7 +88,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 def test_replies_to_quick_jobs_travel_together(clock: Clock) -> None:
     query = Query(jobs(3))
-    turns, work = waiting(query), server(clock, 0.0, 0.5 * KEEP_S, 0.0)
+    turns, work = waiting(query), server(clock, 0.0, 0.5 * TURN_S, 0.0)
     for _ in range(3):
         assert not query.ends
         turns.do_next(work)
@@ -97,7 +97,7 @@ def test_replies_to_quick_jobs_travel_together(clock: Clock) -> None:
 
 def test_a_reply_that_took_long_is_sent_with_those_before(clock: Clock) -> None:
     query = Query(jobs(4))
-    turns, work = waiting(query), server(clock, 0.0, 2.0 * KEEP_S, 0.0, 0.0)
+    turns, work = waiting(query), server(clock, 0.0, 2.0 * TURN_S, 0.0, 0.0)
     for _ in range(3):
         turns.do_next(work)
     assert query.places == [[0, 1]]
@@ -109,17 +109,28 @@ def test_a_reply_that_took_long_is_sent_with_those_before(clock: Clock) -> None:
 
 def test_quick_jobs_that_take_long_together_are_answered(clock: Clock) -> None:
     query = Query(jobs(5))
-    turns, work = waiting(query), server(clock, *[0.4 * KEEP_S] * 5)
+    turns, work = waiting(query), server(clock, *[0.4 * TURN_S] * 5)
     for _ in range(5):
         turns.do_next(work)
     assert query.places == [[0, 1, 2], [3, 4]]
+
+
+def test_jobs_whose_replies_are_sent_do_not_count_any_more(clock: Clock) -> None:
+    query = Query(jobs(3))
+    turns, work = waiting(query), server(clock, *[0.6 * TURN_S] * 3)
+    turns.do_next(work)
+    turns.send_replies()
+    turns.do_next(work)
+    assert query.places == [[0]]
+    turns.do_next(work)
+    assert query.places == [[0], [1, 2]]
 
 
 def test_replies_do_not_wait_for_another_coordinators_job(clock: Clock) -> None:
     one, other = Query(jobs(3)), Query(jobs(3, number=5))
     other.attachment = Payload(b"another")  # type: ignore[assignment]
     shares = (0.6, 0.6, 2.0, 0.3, 0.0)
-    work = server(clock, *[share * KEEP_S for share in shares])
+    work = server(clock, *[share * TURN_S for share in shares])
     turns, sent = waiting(one, other), []
     for _ in shares:
         turns.do_next(work)
