@@ -31,7 +31,7 @@ DATA = DOCS / "data" / "ecosystem"
 RUNS, COURSES, ROBOTS = (DATA / f"{name}.csv" for name in ("runs", "courses", "robots"))
 GAINS = (2.0, 4.0, 8.0, 16.0)
 """Energy of a mating, without patches. With 32 all counts were those with 16."""
-INTAKES = (0.05, 0.1, 0.2, 0.4)
+INTAKES = (0.025, 0.05, 0.1, 0.2)
 """Energy per second in a zone that is never empty; living costs 0.1 per second."""
 INFLOWS = (0.125, 0.25, 0.5, 1.0)
 COSTS = (0.025, 0.05, 0.1, 0.2)
