@@ -7,8 +7,8 @@
 Rows are kept in docs/data/ecosystem, in files of one row per run, per run and minute,
 and per robot of the parts ``control`` and ``neutral``. Runs that have rows are skipped,
 and a run that was begun in the folder is resumed. A run of few robots takes minutes of
-one core; one that stays at the limit of 60, which stand in piles, up to an hour. Those
-that are expected to be short come first; two are made side by side.
+one core; one that stays at the limit of 60, which stand in piles, up to two hours.
+Those that are expected to be short come first; two are made side by side.
 """
 
 import argparse
@@ -98,7 +98,7 @@ SEEDS = {
 }
 """Seeds of each part; a run of ``control`` makes its neutral twin as well.
 
-Three where all or none of the robots die: such a run at the limit of 60 takes an hour.
+Three where energy has no bound: a run that stays at the limit takes up to two hours.
 """
 
 
